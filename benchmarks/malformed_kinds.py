@@ -17,7 +17,6 @@ from independent.folders import to_toml
 
 FOLDER, STUDY, COMPARISON = (SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON"))
 RESULTS, EXPORTS = SANE["RESULTS"], SANE["EXPORTS"]
-_OVERLAY = to_toml(STUDY) + '[[report.overlay]]\nlabel = "x"\nfile = "o.csv"\n'
 _TOLD = {"declared": {"law": RESULTS["loop.json"]["law"], "effects": []}, "stages": []}
 _DATA = {**EXPORTS, "sweep.txt": SANE["SWEEP"]}
 _FORMS = ("python", "sympy", "latex", "json", "rheotool", "ufl")
@@ -48,8 +47,6 @@ HARMED: dict[str, tuple[dict[str, Any], list[str], list[str]]] = {
                             "study.toml": STUDY | {"model": {"from": "old"}}}, [f"old/{name}"],
                            [f"{do} R/study.toml --out R/out" for do in ("compare", "close-loop")])
        for name, tree in RESULTS.items()},
-    "overlaid": ({**FOLDER, "o.csv": SANE["OVERLAY"], "study.toml": _OVERLAY}, ["o.csv"],
-                 ["close-loop R/study.toml --out R/out"]),
     **{f"exported {name}": ({name: tree}, [name],
                             [f"export R --format {form}{out}" for form in _FORMS
                              for out in ("", " --out R/law.txt")])
@@ -92,7 +89,7 @@ def harmed(kind: str, root: Path, source: random.Random) -> Case:
     stems = {word for name in files for word in (Path(name).name, Path(name).stem)}
     call = [word.replace("R", str(root), 1) if word[0] == "R" else word
             for word in source.choice(calls).split()]  # fmt: skip
-    return Case(call, (*stems, *keys, str(root), "--", "rheoTool", "[[source]]", "overlay"))
+    return Case(call, (*stems, *keys, str(root), "--", "rheoTool", "[[source]]"))
 
 
 def nonsense_in_a_folder(root: Path, source: random.Random) -> Case:

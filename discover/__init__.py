@@ -19,8 +19,8 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.dataset import LinearSweep as LinearSweep
     from discover.dataset import Run as Run
     from discover.dataset import check_folder as check_folder
+    from discover.dataset import from_dataframe as from_dataframe
     from discover.dataset import load_dataset as load_dataset
-    from discover.dataset.from_dataframe import from_dataframe as from_dataframe
     from discover.dataset.importing import register_importer as register_importer
     from discover.effects.registry import effects_table as effects
     from discover.effects.registry import register_effect as register_effect
@@ -51,50 +51,12 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from tensor_library import build_library as build_library
     from tensor_library import register_closed_form as register_closed_form
 
-__all__ = [
-    "TBNNUDE",
-    "AbstractConstitutiveLaw",
-    "ClosedForm",
-    "Dataset",
-    "Fluid",
-    "InputError",
-    "LinearSweep",
-    "Run",
-    "TensorSINDy",
-    "after_alternation",
-    "after_steady_flow",
-    "after_step_strain",
-    "build_library",
-    "check_folder",
-    "close_loop",
-    "compare",
-    "effects",
-    "fit",
-    "from_dataframe",
-    "in_flow",
-    "laws",
-    "load",
-    "load_dataset",
-    "make_law",
-    "measured_rate",
-    "oscillatory_shear",
-    "register_closed_form",
-    "register_effect",
-    "register_importer",
-    "register_law",
-    "register_learner",
-    "sampled_rate",
-    "simulate",
-    "start_up",
-    "step_rates",
-    "synthetic_dataset",
-]
-
 _PLACES = {
     "discover.loop.in_memory": ("close_loop",),
     "discover.comparison.in_memory": ("compare",),
-    "discover.dataset": ("LinearSweep", "Dataset", "Run", "check_folder", "load_dataset"),
-    "discover.dataset.from_dataframe": ("from_dataframe",),
+    "discover.dataset": (
+        "LinearSweep", "Dataset", "Run", "check_folder", "from_dataframe", "load_dataset",
+    ),
     "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),
     "discover.errors": ("InputError",),
@@ -106,36 +68,21 @@ _PLACES = {
     "discover.learners.tbnn_ude": ("TBNNUDE",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),
     "discover.protocols": (
-        "after_alternation",
-        "after_steady_flow",
-        "after_step_strain",
-        "in_flow",
-        "measured_rate",
-        "oscillatory_shear",
-        "sampled_rate",
-        "start_up",
-        "step_rates",
+        "after_alternation", "after_steady_flow", "after_step_strain", "in_flow", "measured_rate",
+        "oscillatory_shear", "sampled_rate", "start_up", "step_rates",
     ),
     "discover.simulate": ("synthetic_dataset",),
     "tensor_library": ("ClosedForm", "build_library", "register_closed_form"),
-}
+}  # fmt: skip
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 
+# the last are packages that answer a call
+__all__ = [*_PLACE, "effects", "laws", "simulate"]  # pyright: ignore[reportUnsupportedDunderAll]
+
 _PACKAGES = (
-    "batch",
-    "loop",
-    "comparison",
-    "dataset",
-    "effects",
-    "equations",
-    "identify",
-    "laws",
-    "learners",
-    "protocols",
-    "simulate",
-    "statistics",
-    "study",
-)
+    "batch", "loop", "comparison", "dataset", "effects", "equations", "identify", "laws",
+    "learners", "protocols", "simulate", "statistics", "study",
+)  # fmt: skip
 """Packages that need no import of their own, and are not listed: the door is `__all__`."""
 
 

@@ -124,7 +124,7 @@ class SummaryView(NotebookView):
     _index: ClassVar[tuple[str, ...]] = ("constant",)
     """Names of the levels of the index."""
 
-    _figure: ClassVar[str] = "discover.report.curves:curves_figure"
+    _figure: ClassVar[str] = "discover.report.in_memory:curves_figure"
     """Module and function, with a colon between: from the result to a figure."""
 
     def _estimates(self) -> Sequence[Estimate]:

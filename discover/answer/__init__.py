@@ -1,17 +1,8 @@
 """The answer: a law that one can use, how good it is, where, and what to measure next."""
 
-from discover.answer.answer import (
-    QUANTITIES,
-    TOLERANCE,
-    Answer,
-    Constant,
-    Discrepancy,
-    ExpectedError,
-    HasAnswer,
-    Mode,
-    Range,
-    Suspect,
-)
+from discover.answer.answer import QUANTITIES, TOLERANCE, Answer, HasAnswer
+from discover.answer.constant import Constant
+from discover.answer.parts import Discrepancy, ExpectedError, Mode, Range, Suspect
 
 __all__ = [
     "QUANTITIES",

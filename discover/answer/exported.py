@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from discover.answer.answer import Answer, ExpectedError, Range
+from discover.answer.answer import Answer
+from discover.answer.parts import ExpectedError, Range
 from discover.answer.simple_material import material_of
 from discover.equations.files import read_result
 from discover.equations.formats.rheotool import DENSITY

@@ -6,8 +6,8 @@ from typing import Any
 
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
-_MOST_CONSTANTS = 3
-"""Constants that a first line names; the table has all."""
+_MOST_WORDS, _MOST_CONSTANTS = 60, 3
+"""Words of the first lines, and constants that they name where these allow it."""
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -26,18 +26,37 @@ def headline(answer: Any) -> str:
     return " ".join(filter(None, [law(answer), quality(answer)]))
 
 
+def law(answer: Any) -> str:
+    """Return the law by name with its constants; without one, what stands in its place."""
+    return _first_lines(answer)[0]
+
+
 def quality(answer: Any) -> str:
-    """Return what follows the law: how well it describes, what else there is, where to use it."""
-    behind = answer.alternative if answer.is_empirical else ""
-    parts = [description(answer), answer.failed, where(answer), behind]
-    return " ".join(filter(None, parts))
+    """Return what follows the law: how well it describes, and where to use it."""
+    return _first_lines(answer)[1]
+
+
+def _first_lines(answer: Any) -> tuple[str, str]:
+    """Return both, as short as need be: what gives way is in the table."""
+    told = "", ""
+    for most, brief in ((_MOST_CONSTANTS, False), (2, False), (1, False), (1, True)):
+        parts = description(answer, brief), answer.failed, where(answer)
+        told = _law(answer, most), " ".join(filter(None, parts))
+        if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
+            break
+    return told
 
 
 _LEVEL = f"{LEVEL} "
 
 
-def law(answer: Any) -> str:
-    """Return the law by name with its constants; without one, what stands in its place."""
+def words(text: str) -> int:
+    """Return how many words a text has; numbers are some, signs are none."""
+    return sum(any(map(str.isalnum, one)) for one in text.split())
+
+
+def _law(answer: Any, most: int) -> str:
+    """Return the law by name with at most so many of its constants."""
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
@@ -49,15 +68,16 @@ def law(answer: Any) -> str:
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
     certain = [one for one in own if one.determined and not one.is_wide]
-    named = constants(certain[:_MOST_CONSTANTS])
+    named = constants(certain[:most])
     if several and not answer.is_empirical:
         named.append(counted(len(answer.modes), "mode"))
     elif answer.modes and not several and not own and not _is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
-    if answer.temperature_C is not None and not answer.shift_factors:  # else the rates say it
-        named.append(f"at {degrees(answer.temperature_C)}")
+    if answer.temperature_C is not None:
+        what = "times " if answer.shift_factors else ""  # the rates of use are not at this one
+        named.append(f"{what}at {degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
 
@@ -80,7 +100,8 @@ def shifts(answer: Any) -> list[tuple[float, float]]:
 
 def reduced_to(answer: Any) -> str:
     """Return the temperature to which times and rates of shifted runs were reduced."""
-    return "one temperature" if answer.temperature_C is None else degrees(answer.temperature_C)
+    at = answer.temperature_C
+    return "the reference temperature" if at is None else degrees(at)
 
 
 def shortened(factor: float) -> str:
@@ -93,14 +114,14 @@ _MOST_SHIFTS = 3
 
 
 def shifted(answer: Any) -> str:
-    """Return to which temperature times and rates were shifted, and how far; empty if not."""
+    """Return at which temperature times hold, and what shortens them; empty where nothing does."""
     if not answer.shift_factors:
         return ""
     said = [
         f"{shortened(float(factor))} at {degrees(at)} (a_T = {significant(factor, 3)})"
         for at, factor in shifts(answer)
     ]
-    return f"Times and rates are reduced to {reduced_to(answer)}; times are {', '.join(said)}."
+    return f"Moduli and times are those at {reduced_to(answer)}; times are {', '.join(said)}."
 
 
 def is_a_set(answer: Any) -> bool:
@@ -117,28 +138,57 @@ def is_a_set(answer: Any) -> bool:
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
 
 
-def description(answer: Any) -> str:
-    """Return how well the law describes the runs."""
+def description(answer: Any, brief: bool = False) -> str:
+    """Return how well the law describes the runs, corrected for what, and if that is enough.
+
+    `brief`: without what the table has.
+    """
     if not answer.title:
         return ""
     noise = "" if answer.noise is None else percent_of(answer.noise)
-    residual = "" if answer.error is None else percent_of(answer.error)
-    if answer.fits_to_the_noise:
-        return f"Fits within noise ({noise})." if noise else "Fits within noise."
     found = answer.discrepancy
-    if found is None or not found.size:
-        return f"Residual of the fitted runs {residual}." if residual else ""
-    low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-    size = f"{percent_of(found.size)}{f' ({_LEVEL}{low}–{high} %)' if low != high else ''}"
-    # an error below the noise is known no better than that
-    besides = f"; noise {noise}" if noise and answer.noise > found.size else ""
-    if not found.unseen:  # of fitted runs it is no error that a prediction could have
-        return f"Residual of the fitted runs {size}{besides}."
-    one = answer.expected("sigma12")
-    faster = ""
-    if one.beyond is not None and one.beyond_at.startswith(MEASURED_AT):
-        faster = f", faster ones {_at_most(one.beyond)}"
-    return f"Error: {found.unseen} {size}{faster}{besides}."
+    if answer.fits_to_the_noise:
+        said = f"Fits within noise{f' ({noise})' if noise else ''}"
+    elif found is None or not found.size:
+        said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
+    else:
+        low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
+        size = f"{percent_of(found.size)}{f' ({_LEVEL}{low}–{high} %)' if low != high else ''}"
+        one = answer.expected("sigma12")
+        if not found.unseen:  # of fitted runs it is no error that a prediction could have
+            said = _OF_FITTED + size
+        elif one.beyond is not None and one.beyond_at.startswith(MEASURED_AT) and not brief:
+            said = f"Error: {found.unseen} {size}, faster ones {_at_most(one.beyond)}"
+        else:
+            said = f"Error: {found.unseen} {size}"
+        # an error below the noise is known no better than that
+        said += f"; noise {noise}" if noise and answer.noise > found.size else ""
+    parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
+    return f"{'; '.join(filter(None, parts))}." if said else ""
+
+
+_OF_FITTED = "Residual of the fitted runs "
+
+
+def _corrected(answer: Any, brief: bool) -> str:
+    """Return what of the instrument the errors were corrected for; empty where for nothing."""
+    names = [effect_title(one.effect) for one in answer.suspects]
+    few = len(names) <= (1 if brief else _MOST_SUSPECTS)
+    told = listed(names) if few else f"{len(names)} measurement errors"
+    return f"corrected for suspected {told}" if names else ""
+
+
+_MOST_SUSPECTS = 2
+
+
+def tolerance(answer: Any, brief: bool = False) -> str:
+    """Return whether the tolerance is met, and unless `brief`, in how many runs it is not."""
+    if answer.adequate is None:
+        return ""
+    over, every = len(_over_tolerance(answer)), len(_by_run(answer))
+    missed = f"missed in {over} of {counted(every, 'run')}"
+    state = missed if over and not brief else "met" if answer.adequate else "missed"
+    return f"tolerance {percent_of(answer.tolerance)} {state}"
 
 
 MEASURED_AT = "measured at"
@@ -157,37 +207,57 @@ _FLOWS = {
 }
 
 
-def where(answer: Any) -> str:
-    """Return where the law may be used; in numbers without units where the modes have none."""
+def usable(answer: Any) -> list[str]:
+    """Return for what the law may be used: what it was fitted to and meets, or settles by itself.
+
+    What the law alone says is to be as good as what is asked of the shear stress.
+    """
+    flows = answer.range.flows
     found = []
-    one = answer.range
-    numeral = "λω" if one.oscillates else "λ/duration"
-    if _is_plain(answer) and one.weissenberg is not None:
-        found.append(f"Wi = λγ̇ ≤ {_short(one.weissenberg[1])}")
-        found += [] if one.deborah is None else [f"De = {numeral} = {span(one.deborah)}"]
-    else:
-        found += [] if one.rate_1_s is None else [f"{span(one.rate_1_s)} 1/s"]
-        if (frequencies := one.frequency_rad_s) is not None:
-            alone = "oscillating at " * (frequencies[0] == frequencies[1])
-            found.append(f"{alone}{span(frequencies)} rad/s")
-    if not found:
+    for name, symbol in SYMBOLS.items():
+        one = answer.expected(name)
+        fitted = ("shear" if name == "sigma12" else name) in flows
+        most = _USELESS if one.is_measured else answer.tolerance
+        if fitted if one.inside is None else one.inside <= most:
+            found.append(symbol)
+    return found + [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
+
+
+def where(answer: Any) -> str:
+    """Return for what the law may be used, and in which flows; of no use, where it was fitted."""
+    place, quantities = _place(answer), usable(answer)
+    if not place:
         return ""
-    reduced = f" reduced to {reduced_to(answer)}" if answer.shift_factors else ""
-    place = f"{', '.join([flows_of(answer.range.flows), *found])}{reduced}"
-    if answer.adequate is False and answer.size > _USELESS:
-        return f"Do not use to predict; fitted in {place}."
-    sheared_alone = "shear" in answer.range.flows and "uniaxial" not in answer.range.flows
-    uniaxial, normal = answer.expected("uniaxial"), answer.expected("N1")
-    missed = uniaxial.is_measured and (uniaxial.inside or 0.0) > _USELESS
-    extension = sheared_alone and (missed or uniaxial.missing == "not determined")
-    # what the law alone says of N1 is to be as good as what is asked of the shear stress
-    unknown = not normal.is_known or (
-        not normal.is_measured and (normal.inside or 0.0) > answer.tolerance
-    )
-    if "shear" in answer.range.flows and unknown:
-        not_for = " or ".join([SYMBOLS["N1"], *["extension"] * extension])
-        return f"Use for {place.replace('shear', 'the shear stress', 1)}; not for {not_for}."
-    return f"Use in {place}{', not in extension' * extension}."
+    if not quantities or (answer.adequate is False and answer.size > _USELESS):
+        return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
+    only = " only" * (len(quantities) == 1)
+    return f"Use for {listed(quantities)}{only}, {place}."
+
+
+def _place(answer: Any) -> str:
+    """Return rates and frequencies of the fitted runs, by the temperature of the measurement.
+
+    In numbers without units where the modes have none.
+    """
+    one = answer.range
+    if _is_plain(answer) and one.weissenberg is not None:
+        numeral = "λω" if one.oscillates else "λ/duration"
+        slow = "" if one.deborah is None else f", De = {numeral} = {span(one.deborah)}"
+        return f"Wi = λγ̇ ≤ {_short(one.weissenberg[1])}{slow}"
+    if not one.by_temperature:
+        reduced = f" reduced to {reduced_to(answer)}" if answer.shift_factors else ""
+        return f"{rates}{reduced}" if (rates := _rates(one)) else ""
+    told = [f"{_rates(own)} at {degrees(at)}" for at, own in one.by_temperature.items()]
+    return listed(told) if len(told) <= _MOST_SHIFTS else f"{told[0]} to {told[-1]}"
+
+
+def _rates(one: Any) -> str:
+    """Return the rates of a range, and the frequencies of what oscillates."""
+    found = [] if one.rate_1_s is None else [f"{span(one.rate_1_s)} 1/s"]
+    if (frequencies := one.frequency_rad_s) is not None:
+        several = any(sign in (told := span(frequencies)) for sign in ("–", " to "))
+        found.append(f"{'' if several else 'oscillating at '}{told} rad/s")
+    return ", ".join(found)
 
 
 def _is_plain(answer: Any) -> bool:
@@ -242,25 +312,6 @@ def as_constant(answer: Any, value: float) -> str:
     return significant(value, 3 if one is None else one.digits)
 
 
-def tolerance(answer: Any) -> str:
-    """Return whether the tolerance is met, where, and for which quantities."""
-    if answer.adequate is None:
-        return ""
-    over, every = len(_over_tolerance(answer)), len(_by_run(answer))
-    found: list[str] = []
-    for name, symbol in SYMBOLS.items():
-        one, within = answer.expected(name), answer.within_tolerance(name)
-        if name == "sigma12":
-            within = answer.adequate if within is None else within
-            runs = f"{over} of {counted(every, 'run')}"
-            state = f"misses it in {runs}" if over else "meets it" if within else "misses it"
-            found.append(f"{symbol} {state}{' (fitted runs)' * one.is_residual}")
-        elif within is not None:
-            misses = "meets it" if within else "misses it"
-            found.append(f"{symbol} {misses if one.is_measured else one.missing}")
-    return f"Tolerance {percent_of(answer.tolerance)}: {'; '.join(found)}."
-
-
 def _over_tolerance(answer: Any) -> dict[str, float]:
     """Return runs that are missed by more than the tolerance, with their discrepancy."""
     return {name: size for name, size in _by_run(answer).items() if size > answer.tolerance}
@@ -284,6 +335,12 @@ def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
     of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
     return f"{of}, noise removed"
+
+
+def note(answer: Any, quantity: str) -> str:
+    """Return on what an expected error rests, and that it is more than the tolerance."""
+    above = "above tolerance" if answer.within_tolerance(quantity) is False else ""
+    return ", ".join(filter(None, [answer.expected(quantity).note, above]))
 
 
 def expected(one: Any, place: str) -> str:
@@ -313,6 +370,9 @@ def suspects(answer: Any) -> str:
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 
+CLASSICAL = "Best classical law"
+"""What stands before a law of the field that comes next to a sum without a name."""
+
 SUSPECTED = "Suspected in the measurement, not part of the law"
 """Heading of effects of the instrument and of the flow in the gap."""
 
@@ -325,12 +385,6 @@ def separable(answer: Any) -> bool:
     return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)
 
 
-def further(answer: Any) -> list[str]:
-    """Return what stands below the table: another law, and the tolerance."""
-    behind = "" if answer.is_empirical else answer.alternative
-    return [one for one in (behind, tolerance(answer)) if one]
-
-
 def lines(answer: Any) -> list[str]:
     """Return the answer as lines of text."""
     found = [headline(answer)]
@@ -338,7 +392,8 @@ def lines(answer: Any) -> list[str]:
         parts = []
         for name, symbol in SYMBOLS.items():
             one = answer.expected(name)
-            text = f"{symbol} {expected(one, 'inside')}{f' ({one.note})' if one.note else ''}"
+            rests = note(answer, name)
+            text = f"{symbol} {expected(one, 'inside')}{f' ({rests})' if rests else ''}"
             if one.beyond is not None:
                 at = f" ({one.beyond_at})" if one.beyond_at else ""
                 text += f", beyond the range {_at_most(one.beyond)}{at}"
@@ -346,6 +401,9 @@ def lines(answer: Any) -> list[str]:
         if (worst := worst_run(answer)) is not None:
             parts.append("worst run {}, {}".format(*worst))
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    found += [shifted(answer), suspects(answer), *further(answer)]
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        found.append(f"{CLASSICAL}: {near}, error {percent_of(error)}.")
+    found += [shifted(answer), suspects(answer), answer.alternative]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

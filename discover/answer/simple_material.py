@@ -17,7 +17,7 @@ from scipy.linalg import get_lapack_funcs
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from discover.answer.answer import Constant
+from discover.answer.constant import Constant
 from discover.dataset import Run
 from discover.equations.formats.rheotool import viscous_fluid
 from discover.inference.engine.inelastic import viscosity

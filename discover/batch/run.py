@@ -2,13 +2,11 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from time import perf_counter
-
-import numpy as np
 
 from discover.batch.status import (
     STATES,
@@ -28,7 +26,6 @@ from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study, Verdict
 from discover.validation import validated
-from discover.words import counted
 
 _DRAWING = {"compare": 8.0, "close-loop": 4.5}
 """Seconds in which the pictures of a page are drawn, by task, on a machine of its own."""
@@ -95,66 +92,28 @@ def _compare(study: Study, seed: int | None, folder: RunFolder, part: Progress) 
     """Run both learners of a study and write the comparison report."""
     from discover.comparison.run_comparison import compare
     from discover.report.comparison.report import write_comparison
-    from discover.report.overlay import comparison_overlays, read_overlays
-    from discover.study.data import load_study_data
-    from discover.study.declared_model import declared_model
 
-    sources = read_overlays(study)
     comparison = compare(study, seed, part, folder)
     part("drawing", 1.0)
-    overlays = ()
-    if sources:
-        model = declared_model(study, load_study_data(study, seed).dataset)
-        fluid = model.fluid
-        if comparison.known is not None:
-            modes = np.array(comparison.known.modulus), np.array(comparison.known.relaxation_time)
-            fluid = replace(model, modulus=modes[0], relaxation_time=modes[1]).fluid
-        overlays = comparison_overlays(sources, comparison.flows, fluid)
-    relaxes = study.model.known_relaxation
-    write_comparison(comparison, folder, relaxes, study.text, overlays=overlays)
+    write_comparison(comparison, folder, study.model.known_relaxation, study.text)
     return comparison.answer.lines
 
 
 def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progress) -> Sequence[str]:
     """Close the loop on a study and write its report; a seed only changes synthetic noise."""
     from discover.dataset.run_table import material_and_temperature
-    from discover.loop.loop import run_loop_on
+    from discover.loop.loop import run_study
     from discover.report.loop.report import write_loop
-    from discover.report.overlay import loop_overlays, read_overlays
-    from discover.study.data import load_study_data, temperature
-    from discover.study.declared_model import declared_model, forward_model
+    from discover.study.data import load_study_data
+    from discover.study.declared_model import declared_model
 
     part("loading data", 0.0)
-    sources = read_overlays(study)
-    data_of_study = load_study_data(study, seed)
-    model = declared_model(study, data_of_study.dataset)
-    declared = forward_model(model)
-    asked = dict(study.loop)
-    result = run_loop_on(data_of_study, declared, part, laws=model.choice, **asked)
-    result = replace(
-        result,
-        tolerance=study.verdict.tolerance,
-        temperature_C=temperature(study, data_of_study.dataset),
-    )
+    data = load_study_data(study, seed)
+    declared = declared_model(study, data.dataset)
+    result = run_study(study, data, declared, part)
     part("drawing", 1.0)
-    dataset, window, each = data_of_study.dataset, study.loop.strain, data_of_study.each
-    strain = "" if window is None else f", strain {window[0]:g} to {window[1]:g}"
-    held_out = "each held out in turn" if each else f"{len(data_of_study.held_out)} held out"
-    known = ", ".join(effect.text for effect in model.effects)
-    law = model.described
-    if result.laws:
-        law = f"{result.laws[0].title}, chosen of {len(result.laws)} laws"
-    summary = (
-        f"Data: {dataset.name}, {counted(len(data_of_study.fit), 'run')} fitted, {held_out}{strain}"
-        f". Declared model: {law}, {model.modes_in_words}"
-        f"{f'; known effects: {known}' if known else ''}. "
-        f"{f'{model.source} ' if model.source else ''}{dataset.left_out} {dataset.thinned}"
-    ).strip()
-    conditions = material_and_temperature(dataset, study.data.material)
-    overlays = loop_overlays(sources, result.records, dataset, model.fluid)
-    write_loop(
-        result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays
-    )
+    conditions = material_and_temperature(data.dataset, study.data.material, data.dataset.name)
+    write_loop(result, folder, study.name, result.described, study.text, conditions=conditions)
     return result.answer.lines
 
 

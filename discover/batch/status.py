@@ -46,17 +46,11 @@ class StudyRow:
     learners: Mapping[str, LearnerRow] = field(default_factory=dict)  # by name
     rivals: int | None = None  # number of laws that its data do not tell from the one found
     undetermined: tuple[str, ...] = ()  # quantities that they do not decide
-    chosen: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     effects: tuple[str, ...] = ()  # effects that a closed loop added
     verdict: str = ""  # of the closed loop, or of the comparison
     # on its held-out runs, or on the fitted ones where none were held out
     error_before: float | None = None
     error_after: float | None = None
-
-    @property
-    def agree(self) -> bool:
-        """Whether all rules choose the same terms."""
-        return len({tuple(sorted(terms)) for terms in self.chosen.values()}) <= 1
 
 
 def read_row(folder: Path) -> StudyRow:
@@ -75,15 +69,8 @@ def _comparison(content: Mapping[str, Any]) -> StudyRow:
         str(name): LearnerRow(tuple(map(_term, learner["terms"])), _worst(learner["errors"]))
         for name, learner in content["learners"].items()
     }
-    details = content["learners"].get("tensor_sindy", {}).get("details") or {}
-    chosen = (details.get("selectors") or {}).get("chosen") or {}
-    return StudyRow(
-        learners,
-        len(content["rivals"]),
-        tuple(map(str, content["undetermined"])),
-        {str(rule): tuple(map(str, terms)) for rule, terms in chosen.items()},
-        verdict=str(content.get("verdict", "")),
-    )
+    undetermined, verdict = tuple(map(str, content["undetermined"])), content.get("verdict", "")
+    return StudyRow(learners, len(content["rivals"]), undetermined, verdict=str(verdict))
 
 
 def _term(content: Mapping[str, Any]) -> tuple[str, float, dict[str, float]]:
@@ -122,7 +109,6 @@ def results_table(rows: Sequence[StudyRow]) -> pd.DataFrame:
         for learner, found in row.learners.items():
             line[f"{learner}_terms"] = found.text
             line |= {f"{learner}_{quantity}": error for quantity, error in found.errors.items()}
-        line |= {f"chosen_by_{rule}": ", ".join(terms) for rule, terms in row.chosen.items()}
         line |= {"rivals": row.rivals, "undetermined": ", ".join(row.undetermined)}
         line |= {"effects": ", ".join(row.effects), "verdict": row.verdict}
         line |= {"error_before": row.error_before, "error_after": row.error_after}

@@ -7,7 +7,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -235,7 +235,31 @@ def _fail(message: str, code: int) -> None:
     raise typer.Exit(code)
 
 
-StudyArgument = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
+def pairs(given: Iterable[str], example: str) -> dict[str, str]:
+    """Return what options say that are written NAME=VALUE; InputError where one is not."""
+    found = {}
+    for option in given:
+        key, equals, value = option.partition("=")
+        if not equals or not key.strip() or not value.strip():
+            raise InputError(f"Cannot read {option!r}; write it as name=value, such as {example}.")
+        found[key.strip()] = value.strip()
+    return found
+
+
+def number(text: str, where: str) -> float:
+    """Return the number of an option; InputError, which names it, where it is none."""
+    from discover.dataset.tables.table import is_number
+
+    # float() also reads 1_2, nan and digits of other scripts
+    if not is_number(text):
+        raise InputError(f"{where} must be a number; got {text!r}. Write it as 25 or 0.5.")
+    return float(text)
+
+
+StudyArgument = Annotated[
+    Path,
+    typer.Argument(help="Study file (TOML); discover data import writes one.", show_default=False),
+]
 OutOption = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]

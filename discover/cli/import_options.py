@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from discover.cli.console import number, pairs
 from discover.dataset.importing.convert import ImportedFolder
 from discover.dataset.importing.mapping import (
     EVERY_BLOCK,
@@ -18,34 +19,33 @@ from discover.dataset.importing.mapping import (
     write_mapping,
 )
 from discover.dataset.importing.quantities import to_celsius
-from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import DATA_FILES, TESTS_FILE
 from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
-from discover.study.atomic import make_folder, write_text
+from discover.study.atomic import make_folder, require_free, write_text
 
 
 def merge_mapping(
-    path: Path | None, pairs: AnyMapping[str, Sequence[str] | None],
+    path: Path | None, given: AnyMapping[str, Sequence[str] | None],
     layout: AnyMapping[str, object], geometry: str | None = None,
     blocks: Sequence[int] | None = None, start_time_s: float | None = None,
 ) -> Mapping:  # fmt: skip
     """Return the mapping of a file with the options of the command line on top.
 
-    `pairs`: ``columns``, ``units``, as ``stress=Shear stress``; ``tests``, ``creep``,
+    `given`: ``columns``, ``units``, as ``stress=Shear stress``; ``tests``, ``creep``,
     ``melt.txt=creep`` or ``melt.txt:2=creep``; ``temperatures``, ``40``, the one to import, or
     ``melt.txt=40``, that of a file, in °C, or as ``313K``. `geometry`: as
     ``cone_plate:radius_mm=25,angle_deg=1``. Raises InputError if the file or an option is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):
-        content[key] = {**content.get(key, {}), **_pairs(pairs[key] or (), example)}
+        content[key] = {**content.get(key, {}), **pairs(given[key] or (), example)}
     if geometry is not None:
         kind, _, rest = geometry.partition(":")
         numbers = {
-            key: _number(value, f"--geometry {key}")
-            for key, value in _pairs(filter(None, rest.split(",")), "radius_mm=25").items()
+            key: number(value, f"--geometry {key}")
+            for key, value in pairs(filter(None, rest.split(",")), "radius_mm=25").items()
         }
         content["geometry"] = {"type": kind.strip().replace("-", "_"), **numbers}
     if blocks:
@@ -53,7 +53,7 @@ def merge_mapping(
     if start_time_s is not None:
         content["start_time_s"] = start_time_s
     of_files = dict(content.get("temperatures", {}))
-    for option in pairs["temperatures"] or ():
+    for option in given["temperatures"] or ():
         file, equals, value = option.rpartition("=")
         degrees = _degrees(value if equals else option)
         if equals:
@@ -61,23 +61,13 @@ def merge_mapping(
         else:
             content["temperature_C"] = degrees
     content["temperatures"] = of_files
-    spelled = [one if "=" in one else f"{EVERY_BLOCK}={one}" for one in pairs["tests"] or ()]
-    said = _pairs(spelled, "melt.txt:2=creep")
+    spelled = [one if "=" in one else f"{EVERY_BLOCK}={one}" for one in given["tests"] or ()]
+    said = pairs(spelled, "melt.txt:2=creep")
     # what is said of every block now goes before what was found of each
     content["tests"] = said if EVERY_BLOCK in said else {**content.get("tests", {}), **said}
     known = {key: value for key, value in layout.items() if value is not None}
     content["layout"] = {**content.get("layout", {}), **known}
     return make_mapping(content, "the options" if path is None else f"{path.name} and the options")
-
-
-def _pairs(options, example: str) -> dict[str, str]:
-    pairs = {}
-    for option in options:
-        key, equals, value = option.partition("=")
-        if not equals or not key.strip() or not value.strip():
-            raise InputError(f"Cannot read {option!r}; write it as name=value, such as {example}.")
-        pairs[key.strip()] = value.strip()
-    return pairs
 
 
 def _degrees(text: str) -> float:
@@ -86,24 +76,21 @@ def _degrees(text: str) -> float:
         raise InputError(
             f"--temperature must be a number; got {text!r}. Write 40, melt.txt=40 or 313K."
         )
-    degrees = to_celsius(_number(found[1], "--temperature"), found[2] or "C")
+    degrees = to_celsius(number(found[1], "--temperature"), found[2] or "C")
     assert degrees is not None
     return round(degrees, 6)  # 313.15 - 273.15 is no 40
-
-
-def _number(text: str, where: str) -> float:
-    # float() also reads 1_2, nan and digits of other scripts
-    if not is_number(text):
-        raise InputError(f"{where} must be a number; got {text!r}. Write it as 25 or 0.5.")
-    return float(text)
 
 
 def sources_of(
     mapping: Mapping, path: Path | None, files: Sequence[Path]
 ) -> tuple[list[Path], list[str]]:
-    """Return the files to import, or else those of the mapping file, and which have changed."""
+    """Return the files to import, or else those of the mapping file, and which have changed.
+
+    A folder stands for the files in it.
+    """
     if files or path is None:
-        return list(files), []
+        each = (sorted(one.glob("[!.]*.*")) if one.is_dir() else [one] for one in files)
+        return [one for own in each for one in own], []
     found: list[Path] = []
     changed = []
     remedy = f"Correct [[source]] in {path.name}, or put the file there."
@@ -132,11 +119,7 @@ def write_folder(
                 f"{out / 'imported'}."
             )
     make_folder(out)
-    if not overwrite and any(os.path.lexists(out / name) for name in (*DATA_FILES, TESTS_FILE)):
-        raise InputError(
-            f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
-            "another --out."
-        )
+    require_free(out, (*DATA_FILES, TESTS_FILE), overwrite)
     sources = tuple(
         source.model_copy(update={"file": Path(os.path.relpath(source.file, out)).as_posix()})
         for source in imported.mapping.source

@@ -11,23 +11,9 @@ from discover.cli import console
 from discover.errors import InputError
 
 
-def _laws_like(incomplete: str) -> list[str]:
-    from discover.laws.registry import LAWS
-
-    return [name for name in LAWS if name.startswith(incomplete)]
-
-
-def _formats_like(incomplete: str) -> list[str]:
-    from discover.equations.files import FORMATS
-
-    return [name for name in FORMATS if name.startswith(incomplete)]
-
-
 @console.guarded
 def fit(
-    law: Annotated[
-        str, typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like)
-    ],
+    law: Annotated[str, typer.Argument(help="Name of the law; see: discover laws.")],
     data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
     held_out: Annotated[
         list[str] | None, typer.Option("--held-out", help="Run that only tests the fit.")
@@ -61,9 +47,13 @@ def fit(
 
     enable_x64()
     enable_compilation_cache()
-    ranges = {name: _bounds(name, text) for name, text in _pairs("bounds", bounds)}
+    asked = console.pairs(bounds or (), "alpha=0:0.5")
+    ranges = {name: _bounds(name, text) for name, text in asked.items()}
     numbers = [
-        {name: _number(option, name, text) for name, text in _pairs(option, given)}
+        {
+            name: console.number(text, f"--{option} {name}")
+            for name, text in console.pairs(given or (), "alpha=0.2").items()
+        }
         for option, given in (("start", start), ("fix", fixed))
     ]
     dataset = load_dataset(data)
@@ -99,25 +89,11 @@ def _write(found, out: Path, overwrite: bool) -> None:
     folder.finish()
 
 
-def _pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
-    for text in given or []:
-        if "=" not in text:
-            raise InputError(f"--{option} takes NAME=VALUE; got {text!r}.")
-    return [(name.strip(), value) for name, _, value in (t.partition("=") for t in given or [])]
-
-
-def _number(option: str, name: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"--{option} {name} must be a number; got {text!r}.") from None
-
-
 def _bounds(name: str, text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     if not colon:
         raise InputError(f"--bounds {name} must be two numbers, low:high; got {text!r}.")
-    return _number("bounds", name, low), _number("bounds", name, high)
+    return console.number(low, f"--bounds {name}"), console.number(high, f"--bounds {name}")
 
 
 @console.guarded
@@ -134,7 +110,6 @@ def export(
             "--format",
             "-f",
             help="python, sympy, latex, json, rheotool or ufl.",
-            autocompletion=_formats_like,
         ),
     ] = "python",
     law: Annotated[
@@ -194,7 +169,7 @@ def laws(as_json: console.JsonOption = False) -> None:
     """List the laws that a study can name, including your own, with their parameters."""
     from discover.laws import laws_table
 
-    _show(laws_table(), ("title",), as_json)
+    _show(laws_table(), "title", as_json)
 
 
 @console.guarded
@@ -202,39 +177,22 @@ def effects(as_json: console.JsonOption = False) -> None:
     """List the effects that a loop can add, including your own, with their parameters."""
     from discover.effects import effects_table
 
-    _show(effects_table(), ("kind",), as_json)
+    _show(effects_table(), "kind", as_json)
 
 
-def _show(table: "pd.DataFrame", said: tuple[str, ...], as_json: bool) -> None:
+def _show(table: "pd.DataFrame", said: str, as_json: bool) -> None:
     """Print a table of named things, which has a line for each of their parameters."""
-    entries: dict[str, dict[str, Any]] = {}
-    for line in table.reset_index(names="name").to_dict("records"):
-        words = {key: line[key] for key in ("name", *said, "source")}
-        entry = entries.setdefault(line["name"], {**words, "parameters": {}})
-        if line["parameter"]:
-            entry["parameters"][line["parameter"]] = {
-                "unit": line["unit"],
-                "low": _finite(line["low"]),
-                "high": _finite(line["high"]),
-                "range_scale": line.get("range_scale", "one"),
-            }
+    table = table.reset_index(names="name")
     if as_json:
-        typer.echo(json.dumps(list(entries.values()), indent=2, ensure_ascii=False))
+        typer.echo(table.to_json(orient="records", indent=2, force_ascii=False))
         return
-    for entry in entries.values():
-        ranges = ", ".join(_range(*pair) for pair in entry["parameters"].items())
-        words = ", ".join(entry[key] for key in said)
-        console.say(f"{entry['name']:<32}{words:<26}{ranges or 'no parameter'}")
+    for name, lines in table.groupby("name", sort=False):
+        ranges = ", ".join(_range(line) for line in lines.to_dict("records") if line["parameter"])
+        console.say(f"{name:<32}{lines[said].iloc[0]:<26}{ranges or 'no parameter'}")
 
 
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _range(name: str, parameter: dict[str, Any]) -> str:
-    low, high = (
-        "open" if parameter[end] is None else f"{parameter[end]:g}" for end in ("low", "high")
-    )
-    scale = parameter["range_scale"].replace("_", " ")
-    unit = "" if parameter["unit"] in ("", "1") else f" {parameter['unit']}"
-    return f"{name} ({low} to {high}{unit if scale == 'one' else f' × {scale}'})"
+def _range(line: dict[Any, Any]) -> str:
+    low, high = (f"{x:g}" if math.isfinite(x) else "open" for x in (line["low"], line["high"]))
+    scale = str(line.get("range_scale", "one")).replace("_", " ")
+    unit = "" if line["unit"] in ("", "1") else f" {line['unit']}"
+    return f"{line['parameter']} ({low} to {high}{unit if scale == 'one' else f' × {scale}'})"

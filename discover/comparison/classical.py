@@ -50,7 +50,7 @@ def fit_classical_laws(
 
     The declared law is set aside; modes, solvent and known effects stay.
     """
-    judged = [flow for flow in frame.shown if flow.kind in ("held_out", "test")]
+    judged = [flow for flow in frame.flows if flow.kind in ("held_out", "test")]
     best = found.posterior.fits[0][0] if found.posterior.fits else None
     effects = found.posterior.problem.effects
     bench = [] if best is None else [

@@ -32,24 +32,6 @@ _VERDICTS: Mapping[str, FitVerdict] = {
 
 
 @dataclass(frozen=True)
-class SweepPoint:
-    """Data set of a sweep over laws and a parameter."""
-
-    law: str
-    parameter: str
-    value: float
-    flow: Flow  # the test flow
-    outcomes: Mapping[str, LearnerOutcome]  # by learner
-
-    def errors(self) -> dict[str, dict[str, float | None]]:
-        """Return the errors of each learner in the test flow."""
-        return {
-            name: relative_errors(outcome.predictions[self.flow.key], self.flow.reference)
-            for name, outcome in self.outcomes.items()
-        }
-
-
-@dataclass(frozen=True)
 class Comparison(PageView, HasAnswer, SummaryView):
     """Both learners and the posterior of the same runs, in the same flows.
 
@@ -62,10 +44,9 @@ class Comparison(PageView, HasAnswer, SummaryView):
     perfect learner would find, or None. `noise`: relative noise of synthetic data, or None.
     `rivals`, `statements`: what the data do not determine. `structure`: what the training flows can
     determine of the library; None where not asked. `classical`: classical laws fitted to the same
-    runs. `sweep`: the same again over a parameter. `distillations`: what simpler laws learn from
-    the true one, JSON-able rows. `seed`: of the learners. `known`: known part as an equation; None
-    where it cannot be written out. `known_effects`: effects of the instrument that the data were
-    corrected for. `conditions`: material and temperature, where runs.csv names them.
+    runs. `seed`: of the learners. `known`: known part as an equation; None where it cannot be
+    written out. `known_effects`: effects of the instrument that the data were corrected for.
+    `conditions`: material and temperature, where runs.csv names them.
     """
 
     name: str
@@ -84,8 +65,6 @@ class Comparison(PageView, HasAnswer, SummaryView):
     statements: Sequence[Statement] = ()
     structure: Structure | None = None
     classical: Sequence[ClassicalFit] = ()
-    sweep: Sequence[SweepPoint] = ()
-    distillations: Sequence[Mapping[str, Any]] = ()
     seed: int = 0
     known: Equation | None = None
     known_effects: Sequence[KnownEffect] = ()
@@ -228,9 +207,9 @@ class Comparison(PageView, HasAnswer, SummaryView):
             yield "Laws that these data do not tell from the one found by sparse regression:"
             yield self.rivals_table()
 
-    def known_part_of(self, learner: str) -> Equation:
-        """Return the known part below what a learner found; upper convected Maxwell if unsaid."""
-        del learner  # the same for all
+    @property
+    def known_or_maxwell(self) -> Equation:
+        """The known part below what learners found; upper convected Maxwell if unsaid."""
         return self.known or Equation(())
 
     def equation(self, learner: str) -> Equation:
@@ -299,11 +278,6 @@ class Comparison(PageView, HasAnswer, SummaryView):
             "statements": self.statements,
             "structure": self.structure,
             "physics": self.physics,
-            "sweep": [
-                {"law": p.law, "parameter": p.parameter, "value": p.value, "errors": p.errors()}
-                for p in self.sweep
-            ],
-            "distillation": self.distillations,
             "next_measurement": posterior.next_tests.to_json(),
         }
         return plain(content)

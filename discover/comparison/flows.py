@@ -22,7 +22,7 @@ from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strain
 from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from tensor_library.law_terms import LawTerm
 
 QUANTITIES = ("sigma12", "N1", "N2")
@@ -50,8 +50,7 @@ class Flow:
 
     `times`, `shear_rate`: in s and 1/s, shape (n,). `reference`: the truth where the law is known,
     else the measurement; not every quantity. `measured`: σ12 of training flows, noise included.
-    `training_end`: last time of the training series, or None. `commanded`: the protocol before a
-    known instrument changed it, for titles; None without.
+    `training_end`: last time of the training series, or None.
     """
 
     name: str  # name of the run or of the protocol
@@ -64,12 +63,7 @@ class Flow:
     is_truth: bool = False  # whether `reference` is exact and not a measurement
     training_end: float | None = None
     oscillatory: bool = False  # whether Lissajous curves make sense
-    commanded: protocols.FlowProtocol | None = None
     weight: float = 1.0  # weight of its samples relative to those of other runs; see `Run`
-
-    @property
-    def _imposed(self) -> protocols.FlowProtocol:
-        return self.protocol if self.commanded is None else self.commanded
 
     @property
     def key(self) -> str:
@@ -121,14 +115,14 @@ class Flow:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
         if self.protocol.control == "oscillation":
             return float(np.max(self.rate / self.strain))
-        amplitudes = np.asarray(self._imposed.amplitudes)
-        frequencies = np.abs(np.asarray(self._imposed.frequencies)[amplitudes != 0.0])
+        amplitudes = np.asarray(self.protocol.amplitudes)
+        frequencies = np.abs(np.asarray(self.protocol.frequencies)[amplitudes != 0.0])
         return float(np.max(frequencies)) if frequencies.size else None
 
     @property
     def amplitude(self) -> float:
         """Largest amplitude of the oscillating part of the rate in 1/s."""
-        return float(np.max(np.abs(np.asarray(self._imposed.amplitudes)), initial=0.0))
+        return float(np.max(np.abs(np.asarray(self.protocol.amplitudes)), initial=0.0))
 
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
@@ -160,16 +154,16 @@ class Flow:
     @property
     def title(self) -> str:
         """The flow in the field's notation."""
-        amplitudes = np.asarray(self._imposed.amplitudes)
-        frequencies = np.asarray(self._imposed.frequencies)
-        rates = np.asarray(self._imposed.table_rates)
+        amplitudes = np.asarray(self.protocol.amplitudes)
+        frequencies = np.asarray(self.protocol.frequencies)
+        rates = np.asarray(self.protocol.table_rates)
         if self.oscillatory and np.count_nonzero(amplitudes) == 1:
             i = int(np.flatnonzero(amplitudes)[0])
             size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
             return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
         if not np.any(amplitudes) and rates.size == 1 and self.protocol.control == "rate":
-            if self._imposed.flow != "shear":
-                return f"{self._imposed.flow} extension at ε̇ = {rates[0]:g}"
+            if self.protocol.flow != "shear":
+                return f"{self.protocol.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
         return self.name
 
@@ -356,7 +350,7 @@ def with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]])
     return replace(data, **parts)
 
 
-def require_one_known_law(declared: DeclaredModel) -> None:
+def require_one_known_law(declared: StudyModel) -> None:
     """Refuse a known part that only a closed loop can have."""
     if declared.choice:
         raise InputError(

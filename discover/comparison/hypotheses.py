@@ -18,7 +18,7 @@ from discover.loop.loop import Found, search
 from discover.loop.task import Say, Task
 from discover.progress import Progress, Stopped, may_be_stopped
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel, forward_model
+from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study
 from tensor_library import LawTerm, TermLibrary
 
@@ -37,7 +37,7 @@ MOST_EFFECTS = 3
 
 
 def search_hypotheses(
-    study: Study, data: StudyData, declared: DeclaredModel, library: TermLibrary, say: Say
+    study: Study, data: StudyData, declared: StudyModel, library: TermLibrary, say: Say
 ) -> Found:
     """Return the posterior over what a search adds to the known part.
 
@@ -78,7 +78,6 @@ class Proposed:
 
     terms: tuple[RecoveredTerm, ...]
     share: float = 0.0
-    fit: Fit | None = None  # the hypothesis; None where a term is none that the engine knows
 
 
 def with_proposals(
@@ -123,7 +122,7 @@ def with_proposals(
             proposed[learner] = Proposed(tuple(some))
             continue
         share = shares.get(keys[learner], 0.0)
-        proposed[learner] = Proposed(_refitted(some, fit, found), share, fit)
+        proposed[learner] = Proposed(_refitted(some, fit, found), share)
     return found, proposed
 
 

@@ -9,15 +9,20 @@ from discover.comparison.run_comparison import compare as compare_study
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.laws.registry import name_of
 from discover.learners.files import fingerprint_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import known_part
 from discover.progress import Progress, checked, silent
-from discover.simulate.synthetic import SyntheticDataset
-from discover.study.data import StudyData, parse_study
-from discover.study.declared_model import DeclaredModel
-from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, joined, with_known
+from discover.study.data import StudyData
+from discover.study.declared_model import StudyModel
+from discover.study.in_memory import (
+    HeldOut,
+    data_in_memory,
+    declared_fluid,
+    joined,
+    study_in_memory,
+    with_known,
+)
 from discover.study.schema import Study
 
 
@@ -134,20 +139,11 @@ def compare(
 
 
 def _study(
-    data: StudyData, model: DeclaredModel, options: Mapping[str, Any], tolerance: float
+    data: StudyData, model: StudyModel, options: Mapping[str, Any], tolerance: float
 ) -> Study:
-    """Return the study that would ask for the same with files."""
-    source: dict[str, Any] = {"folder": data.dataset.name or "data in memory"}
-    whole = data.dataset
-    if isinstance(whole, SyntheticDataset) and whole.truth is not None:
-        found = name_of(whole.truth.law)
-        if found is not None:
-            made = {"law": found[0], "parameters": found[1], "noise": whole.noise}
-            source = {"synthetic": made}
     known = {"known_relaxation": bool(model.law.linear_relaxation)}
-    content = {"data": source, "model": known, "compare": dict(options)}
-    content["verdict"] = {"tolerance": tolerance}
-    return parse_study(content, "compare()")
+    asked = {"model": known, "compare": dict(options), "verdict": {"tolerance": tolerance}}
+    return study_in_memory(data.dataset, asked, "compare()")
 
 
 def _fitted(estimators: Any) -> dict[str, RunPrediction]:

@@ -10,19 +10,22 @@ from discover.comparison.flows import (
     MEASURED,
     Flow,
     Stresses,
+    columns_of,
     comparison_flows,
     with_each_run,
 )
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.records import InRecord, absorbed, corrected
 from discover.comparison.simulated import simulated
 from discover.dataset import Run
-from discover.effects import ConstitutiveEffect, KnownEffect
+from discover.effects import ConstitutiveEffect, KnownEffect, StateEffect
+from discover.effects.signal import NORMAL_FORCE_GAIN
 from discover.errors import InputError
-from discover.laws.registry import make_law
+from discover.forward import make_batch
+from discover.loop.final_model import augmented_fluid
 from discover.loop.from_posterior import Ended
+from discover.loop.task import require_possible
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 
 _INSIDE = 1e-3
 """Least share of its interval by which an instant is away from a sample."""
@@ -32,27 +35,26 @@ _INSIDE = 1e-3
 class Frame:
     """What learners are given, and how what they find appears in the records.
 
-    `made`: the instrument in the stress of a run, by its name.
+    `added`: what the instrument adds to the records of a run, by its name.
     """
 
-    model: DeclaredModel  # the known part, nothing of it left to be fitted
+    model: StudyModel  # the known part, nothing of it left to be fitted
     data: StudyData  # the runs that they learn from, without what the instrument did
-    flows: list[Flow]  # the flows in which their laws are simulated
-    shown: list[Flow]  # the same flows with the records as they are
-    made: Mapping[str, InRecord] = field(default_factory=dict)
+    flows: list[Flow]  # the flows in which their laws are simulated, with the records as they are
+    added: Mapping[str, Stresses] = field(default_factory=dict)
     effects: tuple[KnownEffect, ...] = ()  # of the instrument, taken out of the records
 
     def recorded(self, flow: Flow, stresses: Stresses | None) -> Stresses | None:
         """Return what would be recorded of the stresses in a flow."""
-        instrument = self.made.get(flow.name) if flow.kind in MEASURED else None
-        if stresses is None or instrument is None:
+        added = self.added.get(flow.name) if flow.kind in MEASURED else None
+        if stresses is None or added is None:
             return stresses
-        return {**stresses, "sigma12": instrument.recorded(stresses["sigma12"])}
+        return {quantity: values + added[quantity] for quantity, values in stresses.items()}
 
     def outcome(self, own: LearnerOutcome) -> LearnerOutcome:
         """Return a learner's outcome with predictions of the records."""
         predictions, bands = dict(own.predictions), dict(own.bands)
-        for flow in self.flows if self.made else ():
+        for flow in self.flows if self.added else ():
             predictions[flow.key] = self.recorded(flow, predictions[flow.key])
             limits = bands.get(flow.key)
             if limits is not None:
@@ -70,7 +72,7 @@ class Frame:
 
 
 def known_part(
-    declared: DeclaredModel,
+    declared: StudyModel,
     ended: Ended,
     data: StudyData,
     high_deborah: tuple[float, ...],
@@ -82,49 +84,64 @@ def known_part(
     InputError if learners cannot be given a declared effect.
     """
     data = _dated(ended, data)
-    model = absorbed(_with_values(declared, ended))
+    model = _as_fitted(declared, ended)
     known = tuple(model.effects)
     found = known if ended.verdict != "effects_added" else (*known, *_found(ended))
     try:
-        without, made = corrected(data, found)
-    except InputError:  # what was found has a memory, or the runs are of another kind
+        without, added = without_instrument(data, ended, found)
+    except InputError:  # the runs are of another kind
         found = known
-        without, made = corrected(data, known)
-    model = replace(model, effects=())
-    shown = comparison_flows(data, high_deborah, pipkin)
-    if not made:
-        return Frame(model, without, shown, shown, effects=found)
-    commanded = {run.name: run.protocol for run in data.dataset}
-    flows = [
-        replace(flow, commanded=commanded[flow.name]) if flow.kind in MEASURED else flow
-        for flow in comparison_flows(without, high_deborah, pipkin)
-    ]
-    return Frame(model, without, flows, shown, made, found)
+        without, added = without_instrument(data, ended, known)
+    flows = comparison_flows(data, high_deborah, pipkin)
+    return Frame(replace(model, effects=()), without, flows, added, found)
 
 
-def _with_values(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
-    """Return the declared model with numbers for what was to be fitted."""
-    model, theta = ended.posterior.problem.model, ended.fit.theta
-    parameters = dict(declared.parameters)
-    for i, parameter in enumerate(model.declared.free_parameters):
-        parameters[parameter.name] = float(theta[2 + i])
-    free = [name for name in declared.free if name in parameters]
-    modulus, relaxation_time = declared.modulus, declared.relaxation_time
-    if "modulus_Pa" in declared.free:
-        modulus = modulus * np.exp(theta[0])
-    if "relaxation_time_s" in declared.free:
-        relaxation_time = relaxation_time * np.exp(theta[1])
-    effects = tuple(
+def _as_fitted(declared: StudyModel, ended: Ended) -> StudyModel:
+    """Return the declared model with numbers for what was fitted.
+
+    Its effects of the fluid are in its law, modes and solvent then, and the others are of the
+    instrument. Raises InputError if learners cannot take an effect.
+    """
+    model, theta = ended.posterior.problem.model, ended.theta
+    effects = (
         replace(known, values=tuple(map(float, theta[model.positions(known.name)])))
         if known.free
         else known
         for known in declared.effects
     )
+    effects = [known for known in effects if known.values[0] != 0.0]  # else it is none
+    of_fluid = [known for known in effects if isinstance(known.effect, ConstitutiveEffect)]
+    for known in of_fluid:
+        _require_terms(known)
+    own = model.declared
+    free = theta[2 : 2 + len(own.free_parameters)]
+    names = [parameter.name for parameter in own.free_parameters]
+    fluid = augmented_fluid(model, theta, [known.name for known in of_fluid])
     return replace(
-        declared, law=make_law(declared.law_name, parameters) if free else declared.law,
-        parameters=parameters, modulus=modulus, relaxation_time=relaxation_time, effects=effects,
-        free=(),
+        declared,
+        law=fluid.law if of_fluid else own.law_with(free),
+        law_name=" with ".join([declared.law_name, *(known.text for known in of_fluid)]),
+        parameters=declared.parameters | dict(zip(names, map(float, free), strict=True)),
+        modulus=np.asarray(fluid.modulus), relaxation_time=np.asarray(fluid.relaxation_time),
+        solvent_viscosity=float(fluid.solvent_viscosity),
+        effects=tuple(k for k in effects if not isinstance(k.effect, ConstitutiveEffect)), free=(),
     )  # fmt: skip
+
+
+def _require_terms(known: KnownEffect) -> None:
+    """Refuse an effect of the fluid that no law of library terms carries."""
+    effect, values = known.effect, [value or 0.0 for value in known.values]
+    if isinstance(effect, StateEffect):
+        why = "it gives the fluid a state that no law of stress and rate carries"
+    elif isinstance(effect, ConstitutiveEffect) and effect.as_terms(values) is None:
+        why = "what it adds to the law is not a sum of library terms"
+    else:
+        return
+    raise InputError(
+        f"compare cannot take {known.name} as known: {why}. Leave it out of [model] effects, or, "
+        "where it comes from an earlier result, give it an amplitude of 0 there; discover "
+        "close-loop knows it."
+    )
 
 
 def _found(ended: Ended) -> list[KnownEffect]:
@@ -161,3 +178,59 @@ def _dated(ended: Ended, data: StudyData) -> StudyData:
         return replace(run, protocol=moved, rate_steps=())
 
     return with_each_run(data, dated) if steps else data
+
+
+_NORMAL = ("first_normal_stress_difference", "second_normal_stress_difference")
+
+
+def without_instrument(
+    data: StudyData, ended: Ended, effects: Sequence[KnownEffect]
+) -> tuple[StudyData, Mapping[str, Stresses]]:
+    """Return data without what the instrument did to them, and what that is, by name of the run.
+
+    What effects did is by how much they change what the likeliest hypothesis records. So where that
+    misses a run by 5 % and a gain is 10 %, the record is corrected to 0.5 %; and a motor or a
+    transducer with a memory is taken out as well as a gain. Runs in extension, which another
+    instrument makes, stay as they are.
+
+    `data`: as recorded. `effects`: of the instrument, with their values. Raises InputError if an
+    effect acts on a measured rate that contains it, or a run is not at a given rate in time.
+    """
+    require_possible(effects, data.dataset.runs)
+    other = next((run for run in data.dataset if run.protocol.control != "rate"), None)
+    # an instrument is the same, whatever the loading
+    runs = [replace(run, loading=None) for run in data.dataset if run.flow == "shear"]
+    if not effects or not runs:
+        return data, {}
+    if other is not None:
+        names = ", ".join(known.name for known in effects)
+        raise InputError(
+            f"compare takes effects of an instrument ({names}) out of runs at a given rate in "
+            f"time, and {other.name} is none. Leave it out of [data], leave the effects out, or "
+            "use discover close-loop."
+        )
+    model, with_it = ended.posterior.problem.model, ended.fit.theta.copy()
+    without = with_it.copy()
+    for known in effects:
+        with_it[model.positions(known.name)] = known.values
+        without[model.positions(known.name)[0]] = 0.0  # at zero amplitude an effect is none
+    with np.errstate(all="ignore"):  # a law that diverges in a run tells nothing of it
+        recorded, felt = model.observables([with_it, without], make_batch(runs))
+    force = [k.values[0] or 0.0 for k in effects if k.effect.name == NORMAL_FORCE_GAIN.name]
+    recorded[..., 1:] *= 1.0 + sum(force)
+    added = np.nan_to_num(recorded - felt, posinf=0.0, neginf=0.0)
+    by_run = {run.name: columns_of(own[: len(run)]) for run, own in zip(runs, added, strict=True)}
+
+    def undone(run: Run) -> Run:
+        own = by_run.get(run.name)
+        if own is None:
+            return run
+        normal = {
+            name: values - own[quantity]
+            for name, quantity in zip(_NORMAL, ("N1", "N2"), strict=True)
+            if (values := getattr(run, name)) is not None
+        }
+        stress = run.stress - own["sigma12"] if run.quantity == "sigma12" else run.stress
+        return replace(run, stress=stress, **normal)
+
+    return with_each_run(data, undone), by_run

@@ -2,26 +2,24 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.simulated import physics_of, simulated
 from discover.dataset.run import Run
-from discover.errors import InputError
 from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.progress import Progress, silent
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary, build_library
 
 
 def train(
-    learner: str, study: Study, model: DeclaredModel, runs: Sequence[Run], seed: int = 0,
+    learner: str, study: Study, model: StudyModel, runs: Sequence[Run], seed: int = 0,
     progress: Progress = silent,
 ) -> tuple[LearnerResult, Fluid]:  # fmt: skip
     """Return what one learner finds in these runs, and the fluid that it makes.
@@ -103,16 +101,10 @@ class Learning:
             found |= at_once({learner: part(learner) for learner in group}, say)
         return {learner: found[learner] for learner in learners}
 
-    def outcome(
-        self, learner: str, frame: Frame, progress: Progress, part: str = ""
-    ) -> LearnerOutcome:
-        """Return what a learner finds, in the frame in which it works.
-
-        `part`: name under which a point of a sweep is kept, looked at in one flow.
-        """
+    def outcome(self, learner: str, frame: Frame, progress: Progress) -> LearnerOutcome:
+        """Return what a learner finds, in the frame in which it works."""
         store, made, flows = self.store, self.made, frame.flows
-        name = part or learner
-        kept = None if store is None else store.load(name)
+        kept = None if store is None else store.load(learner)
         if kept is not None and all(flow.key in kept["predictions"] for flow in flows):
             return LearnerOutcome.from_state(kept)
         progress("starting", 0.0)
@@ -124,43 +116,9 @@ class Learning:
             )
         found = simulated(fluid, flows)
         outcome = LearnerOutcome.of(result, fluid, flows, found.predictions)
-        if not part:
-            outcome = replace(outcome, physics=physics_of(found, flows))
+        outcome = replace(outcome, physics=physics_of(found, flows))
         if store is not None:
-            store.save(name, outcome.to_state())
+            store.save(learner, outcome.to_state())
             # the same route as after an interruption, so that both give the same files
             return LearnerOutcome.from_state(outcome.to_state())
         return outcome
-
-
-def require_teacher(study: Study) -> None:
-    """Refuse a distillation where no law made the data."""
-    if study.compare.distillation and study.data.synthetic is None:
-        raise InputError(
-            "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
-            "{...}. Teach laws by name with discover.learners.distillation.distil."
-        )
-
-
-def distilled(
-    study: Study, truth: Fluid | None, store: RunFolder | None, progress: Progress
-) -> list[dict[str, Any]]:
-    """Return what the law that made the data teaches each other law, where that is asked for."""
-    if not study.compare.distillation:
-        return []
-    assert truth is not None
-    assert study.data.synthetic is not None
-    kept = None if store is None else store.load("distillation")
-    if kept is not None:
-        return kept["rows"]
-    from discover.learners.distillation import STUDENTS, distil
-
-    teacher = study.data.synthetic.law
-    students = [name for name in STUDENTS if name != teacher]
-    rows = []
-    for i, student in enumerate(students):
-        progress(f"{teacher} teaches {student}", i / len(students))
-        rows.append({"teacher": teacher, **distil(truth, student).as_dict()})
-    if store is not None:
-        store.save("distillation", {"rows": rows})
-    return rows

@@ -19,7 +19,7 @@ from discover.protocols.kinematics import FOLLOWED
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.study.schema import Study
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
@@ -196,7 +196,7 @@ def _ratio(value: float, others: Sequence[float]) -> float:
     return value / largest if largest > 0.0 else float("inf") if value > 0.0 else 0.0
 
 
-def expectation_of(study: Study, model: DeclaredModel, data: StudyData) -> Expectation:
+def expectation_of(study: Study, model: StudyModel, data: StudyData) -> Expectation:
     """Return what a complete law may leave of the runs: noise, the sweep's own error, repeats."""
     repeats, noise = repeats_among(list(data.dataset)), study.loop.noise
     linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error

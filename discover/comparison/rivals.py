@@ -15,7 +15,7 @@ from discover.forward import make_batch
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.loop.loop import Found
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
 from tensor_library.law_terms import spell
@@ -68,7 +68,7 @@ class Rival:
 
 def exact_twins(
     terms: Sequence[LawTerm],
-    model: DeclaredModel,
+    model: StudyModel,
     flows: Sequence[Flow],
     library: TermLibrary | None = None,
 ) -> list[Rival]:
@@ -152,7 +152,7 @@ def _rival_of(twin: identify.Twin, beyond: Sequence[str]) -> Rival:
 
 
 def _simulate(
-    terms: LawTerms, model: DeclaredModel, flows, names: Iterable[str] = ()
+    terms: LawTerms, model: StudyModel, flows, names: Iterable[str] = ()
 ) -> dict[str, Stresses | None]:
     """Return what a law does in each flow, in a program for all laws of terms of these names."""
     whole = LawTerms({**dict.fromkeys(names, 0.0), **terms.coefficients}, terms.inner)
@@ -194,7 +194,7 @@ def structure_of(
     terms: Sequence[LawTerm],
     runs: Sequence[Run],
     library: TermLibrary,
-    model: DeclaredModel,
+    model: StudyModel,
     use_normal_stresses: bool,
 ) -> identify.Structure:
     """Return what the flows of these runs determine, at the known part and at the law found."""

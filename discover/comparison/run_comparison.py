@@ -1,14 +1,14 @@
 """Comparison of a study, part by part, so that a run that was stopped can go on."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from discover.comparison.bands import Band, flow_bands
 from discover.comparison.classical import fit_classical_laws
-from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.comparison import Comparison
 from discover.comparison.flows import (
     DRAWN,
     Flow,
@@ -22,82 +22,28 @@ from discover.comparison.flows import (
 )
 from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
-from discover.comparison.learning import Learning, distilled, require_teacher, study_library
+from discover.comparison.learning import Learning, study_library
 from discover.comparison.outcome import LearnerOutcome, expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.comparison.time_left import ComparisonTime
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
-from discover.errors import InputError
-from discover.laws import LAWS, Fluid, make_law
+from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
-from discover.loop.loop import Found
+from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
-from discover.study.data import StudyData, load_study_data, temperature
-from discover.study.declared_model import DeclaredModel, declared_model, forward_model
+from discover.study.data import StudyData, load_study_data
+from discover.study.declared_model import StudyModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
-from discover.words import counted, unknown_name
+from discover.words import counted
 from tensor_library import LawTerm, TermLibrary
-
-Asked = tuple[str, float, Study]
-"""A law, the value of its parameter, and the study of that point."""
-
-
-def sweep_studies(study: Study) -> list[Asked]:
-    """Return the law, the value and the study of each point of a sweep."""
-    sweep, synthetic = study.compare.sweep, study.data.synthetic
-    if sweep is None:
-        return []
-    if synthetic is None:
-        raise InputError(
-            "compare.sweep makes synthetic data, so [data] must say synthetic = {...} too."
-        )
-    studies = []
-    for law in sweep.laws:
-        if sweep.parameter not in LAWS[law].parameters:
-            its = LAWS[law].parameters
-            said = unknown_name("parameter", sweep.parameter, its, f"the law {law!r}")
-            raise InputError(f"compare.sweep: {said}")
-        for value in sweep.values:
-            make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
-            made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})
-            data = study.data.model_copy(update={"synthetic": made})
-            studies.append((law, value, study.model_copy(update={"data": data})))
-    return studies
-
-
-def sweep_points(
-    asked: Sequence[Asked],
-    learning: Learning,
-    model: DeclaredModel,
-    seed: int | None,
-    step: Callable[[int, str], Progress],
-) -> list[SweepPoint]:
-    """Return what each learner of a study finds at each point of its sweep.
-
-    `asked`: from `sweep_studies`. `model`: the known part. `seed`: overrides the study's seed of
-    the noise. `step`: returns progress for so many learners done and a title.
-    """
-    options, points = learning.study.compare, []
-    for i, (law, value, other) in enumerate(asked):
-        data = thinned_to(load_study_data(other, seed), options.most_samples)
-        flow = comparison_flows(data, ())[len(data.fit)]
-        alone = Frame(model, data, [flow], [flow])
-        elsewhere, found = replace(learning, study=other, made=None), {}
-        for j, learner in enumerate(options.learners):
-            part = f"sweep_{law}_{value:g}_{learner}"
-            say = step(i * len(options.learners) + j, part)
-            found[learner] = elsewhere.outcome(learner, alone, say, part)
-        assert options.sweep is not None
-        points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
-    return points
 
 
 def data_in_words(data: StudyData, study: Study) -> str:
@@ -119,7 +65,7 @@ def data_in_words(data: StudyData, study: Study) -> str:
     return f"{runs} computed from the {law} law, {noise}"
 
 
-def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
+def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
     """Return what was known before, and what was fitted with the likeliest hypothesis."""
     text = _law_and_modes(frame.model, study)
     if declared.free_constants:
@@ -130,7 +76,7 @@ def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 
 
-def _law_and_modes(model: DeclaredModel, study: Study) -> str:
+def _law_and_modes(model: StudyModel, study: Study) -> str:
     if not study.model.known_relaxation:
         return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
     named = LAWS.get(model.law_name)
@@ -147,7 +93,7 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
 def compare(
     study: Study, seed: int | None = None, progress: Progress = silent,
     store: RunFolder | None = None, *, data: StudyData | None = None,
-    declared: DeclaredModel | None = None,
+    declared: StudyModel | None = None,
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
     library: TermLibrary | None = None,
 ) -> Comparison:  # fmt: skip
@@ -167,15 +113,8 @@ def compare(
     if made is None:  # estimators that are fitted already saw every sample
         data, of_spikes = without_spikes_in_fit(data)
         data = thinned_to(data, options.most_samples)
-    require_teacher(study)
-    sweep = sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
-    if sweep and (declared.free_constants or declared.effects):
-        raise InputError(
-            "compare.sweep computes data that hold no instrument, so [model] can have neither "
-            'effects nor constants to be fitted. Write numbers instead of "fit".'
-        )
     data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
     pipkin = list(itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers))
     library = study_library(study) if library is None else library
@@ -187,29 +126,14 @@ def compare(
         if simple is not None:
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
-    n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation)
     several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
-    trainings = n_parts / len(options.learners)
-    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out, trainings)
+    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out, trainings=1.0)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     times.learning()
 
-    def at(done: int, title: str) -> Progress:
-        def say(text: str, fraction: float) -> None:
-            share = (done + fraction) / n_parts
-            times.learned(f"{title}: {text}" if title else text, share)
-
-        return say
-
-    def learn(text: str, fraction: float) -> None:
-        at(0, "")(text, fraction * len(options.learners))
-
-    own = learning.outcomes(options.learners, frame, learn)
-    done = len(own)
-    points = sweep_points(sweep, learning, frame.model, seed, lambda i, title: at(done + i, title))
-    distillations = distilled(study, data.truth, store, at((1 + len(sweep)) * done, "distillation"))
+    own = learning.outcomes(options.learners, frame, times.learned)
     times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
@@ -223,23 +147,23 @@ def compare(
         name=study.name,
         data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
         known_part=known_in_words(declared, frame, study),
-        flows=frame.shown,
+        flows=frame.flows,
         before=frame.alone(),
         outcomes=outcomes,
-        posterior=_titled(found.result(), study, data),
+        posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
         lack_of_fit=lacks_of_fit(
-            outcomes, frame.shown, expectation_of(study, declared, data),
+            outcomes, frame.flows, expectation_of(study, declared, data),
             options.use_normal_stresses,
         ),
         truth=_truth(study, declared),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
-        sweep=points,
-        distillations=distillations,
         seed=learning.seed,
         known=known_equation(frame.model),
         known_effects=frame.effects,
-        conditions=material_and_temperature(data.dataset, study.data.material),
+        conditions=material_and_temperature(
+            data.dataset, study.data.material, data.dataset.name
+        ),
     )  # fmt: skip
     comparison = _with_what_is_open(comparison, found, frame, data, study, library)
     progress("done", 1.0)
@@ -247,7 +171,7 @@ def compare(
 
 
 def _of_material(
-    simple: LoopResult, study: Study, data: StudyData, declared: DeclaredModel, seed: int
+    simple: LoopResult, study: Study, data: StudyData, declared: StudyModel, seed: int
 ) -> Comparison:
     """Return the comparison for a yield stress, a viscous fluid or a solid: no learner is asked."""
     assert simple.material is not None
@@ -267,22 +191,14 @@ def _of_material(
     why = f"A {simple.material.title} has no law for it, and it was not measured."
     return Comparison(
         name=study.name, data_summary=data_in_words(data, study),
-        known_part=known_in_words(declared, Frame(declared, data, flows, flows), study),
+        known_part=known_in_words(declared, Frame(declared, data, flows), study),
         flows=flows, before=before, outcomes={},
-        posterior=_titled(simple, study, data), bands=bands,
+        posterior=titled(simple, study, data), bands=bands,
         statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")], seed=seed,
-        conditions=material_and_temperature(data.dataset, study.data.material),
+        conditions=material_and_temperature(
+            data.dataset, study.data.material, data.dataset.name
+        ),
     )  # fmt: skip
-
-
-def _titled(found: LoopResult, study: Study, data: StudyData) -> LoopResult:
-    """Return a result with the study's name, tolerance and temperature."""
-    return replace(
-        found,
-        title=study.name,
-        tolerance=study.verdict.tolerance,
-        temperature_C=temperature(study, data.dataset),
-    )
 
 
 def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
@@ -299,10 +215,10 @@ def _with_what_is_open(
 ) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
-        statements = make_statements("no_signal", frame.shown, {}, None, {})
+        statements = make_statements("no_signal", frame.flows, {}, None, {})
         return replace(comparison, statements=statements)
     runs = {run.name: run for run in data.dataset}
-    drawn = [flow for flow in frame.shown if flow.kind in DRAWN]
+    drawn = [flow for flow in frame.flows if flow.kind in DRAWN]
     bands = flow_bands(found, drawn, runs)
     best = found.posterior.fits[0][0] if found.posterior.fits else None
     terms = None if best is None else terms_of(best, found)
@@ -319,7 +235,7 @@ def _with_what_is_open(
     others = explanations_apart(found, drawn, runs)
     spread = comparison.posterior.spread_of_laws
     statements = make_statements(
-        comparison.verdict, frame.shown, bands, structure,
+        comparison.verdict, frame.flows, bands, structure,
         {name: one.inside for name, one in spread.items()}, study.compare.use_normal_stresses,
         len(terms),
     )  # fmt: skip
@@ -329,7 +245,7 @@ def _with_what_is_open(
     )  # fmt: skip
 
 
-def _truth(study: Study, model: DeclaredModel) -> tuple[LawTerm, ...] | None:
+def _truth(study: Study, model: StudyModel) -> tuple[LawTerm, ...] | None:
     synthetic = study.data.synthetic
     if synthetic is None or model.law_name != "ucm":
         return None

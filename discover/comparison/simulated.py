@@ -27,7 +27,7 @@ class Simulated:
 
 
 def simulated(fluid: Fluid, flows: Sequence[Flow]) -> Simulated:
-    """Return what a fluid does in flows, by one program that fluids of equal modes share.
+    """Return what a fluid does in flows.
 
     Training flows set the box beyond which the law extrapolates.
     """

@@ -20,7 +20,7 @@ from discover.errors import InputError
 from discover.identify import Structure
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import LINEAR_STRAIN, ONLY_STATES
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.words import percent_of
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
@@ -182,7 +182,7 @@ _PROJECTION = (
 )
 
 
-def known_equation(model: DeclaredModel) -> Equation | None:
+def known_equation(model: StudyModel) -> Equation | None:
     """Return the known part of a study as an equation; None where it cannot be written out."""
     try:
         return Equation.of_fluid(model.fluid)

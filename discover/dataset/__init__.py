@@ -8,10 +8,10 @@ from discover.dataset.linear_viscoelasticity import (
     RelaxationSpectrum,
     relaxation_spectrum,
 )
-from discover.dataset.load import load_dataset
+from discover.dataset.load import from_dataframe, load_dataset
 from discover.dataset.run import Run
 
 __all__ = [
     "Dataset", "Finding", "Findings", "LinearSweep", "RelaxationSpectrum", "Run", "check_folder",
-    "load_dataset", "relaxation_spectrum",
+    "from_dataframe", "load_dataset", "relaxation_spectrum",
 ]  # fmt: skip

@@ -87,18 +87,6 @@ def _creep(table: Table) -> Run:
     )  # fmt: skip
 
 
-def read_over_time(path: Path, kind: str) -> list[Float[np.ndarray, " n"]]:
-    """Return times in s and the ``relaxation`` modulus in Pa, or ``creep`` compliance in 1/Pa."""
-    table, quantity = (
-        read_table(path),
-        {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind],
-    )
-    columns = table.all_required(units.TIME, quantity)
-    table.require_positive(units.TIME)
-    order = np.argsort(columns[0], kind="stable")  # clocks that are written short repeat themselves
-    return [values[order] for values in columns]
-
-
 def _amplitude_sweep(table: Table) -> Run:
     columns = table.all_required(
         units.STRAIN, units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS

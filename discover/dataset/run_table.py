@@ -118,13 +118,18 @@ def temperature_of(runs: Iterable[Run]) -> float | None:
     return found.pop() if len(found) == 1 else None
 
 
-def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
-    """Material (a study's, or of runs.csv) and temperature of runs in words, if told."""
+def material_and_temperature(runs: Iterable[Run], material: str = "", otherwise: str = "") -> str:
+    """Material (a study's, or of runs.csv) and temperature of runs in words, if told.
+
+    `otherwise`: what stands for the material where nobody told one or two.
+    """
     names, temperatures = [], set()
     for run in runs:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]
         temperatures |= set() if run.temperature_C is None else {round(run.temperature_C, 0)}
     parts = [material] if material else list(dict.fromkeys(names))
+    if otherwise and not 0 < len(parts) <= 2:
+        parts = [otherwise]
     if len(parts) > 2:  # names of fillings or files, which say nothing in a title
         parts = [f"{len(parts)} samples"]
     spelled = [f"{value:.0f}".replace("-", "−") for value in sorted(temperatures)]

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from discover.effects import base, kinematic, memory, network, signal, structure
 from discover.effects.letters import Spelled, spelled_apart
-from discover.effects.library_term import library_effects, library_term
+from discover.effects.library_term import library_term
 from discover.errors import InputError, Problems
 from discover.validation import require_new_name
 from discover.words import nearest, unknown_name
 from tensor_library.closed_forms import Registry
+from tensor_library.library import build_library
 from tensor_library.terms import parse_term
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ def named_effects() -> Mapping[str, base.AbstractEffect]:
 @cache
 def built_in_effects() -> Mapping[str, base.AbstractEffect]:
     """Return the effects that a model may have without a user's own, those of the library last."""
-    nameless = library_effects()
-    return EFFECTS.built_in | {effect.name: effect for effect in nameless}
+    terms = map(library_term, build_library(degree=1).terms)
+    return EFFECTS.built_in | {effect.name: effect for effect in terms}
 
 
 def effects_table() -> "pd.DataFrame":

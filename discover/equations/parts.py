@@ -1,7 +1,7 @@
 """Laws in parts: a law with a name, a sum of terms, states of the whole fluid."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import equinox as eqx
@@ -222,12 +222,8 @@ class AugmentedLaw(AbstractExtendedLaw):
             i for i, one in enumerate(self.effects)
             if one.as_terms(list(map(float, self.values[i]))) is not None
         ]  # fmt: skip
-        law = AugmentedLaw(
-            base=self.base,
-            values=tuple(self.values[i] for i in kept),
-            effects=tuple(self.effects[i] for i in kept),
-            linear_relaxation=self.linear_relaxation,
-        )
+        values, effects = ([of[i] for i in kept] for of in (self.values, self.effects))
+        law = replace(self, values=tuple(values), effects=tuple(effects))
         return law, tuple(one for i, one in enumerate(self.effects) if i not in kept)
 
     def with_named(self, name: str) -> "tuple[AugmentedLaw, str] | None":
@@ -247,14 +243,8 @@ class AugmentedLaw(AbstractExtendedLaw):
                 continue
             built = law.build(value)
             if (built.as_terms() or ()) and law_terms(built) == alone:
-                values = self.values[:at] + self.values[at + 1 :]
-                others = self.effects[:at] + self.effects[at + 1 :]
-                whole = AugmentedLaw(
-                    base=built,
-                    values=values,
-                    effects=others,
-                    linear_relaxation=self.linear_relaxation,
-                )
+                values, effects = (of[:at] + of[at + 1 :] for of in (self.values, self.effects))
+                whole = replace(self, base=built, values=values, effects=effects)
                 return whole, next(iter(law.parameters))
         return None
 

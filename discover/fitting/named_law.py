@@ -28,7 +28,7 @@ from discover.plain_numbers import as_number, as_whole_number
 from discover.protocols.between_samples import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
-from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Verdict
 from discover.validation import validated
@@ -179,7 +179,7 @@ def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
 def _declared(
     law: str, data: Dataset, base: Fluid | None, runs: Sequence[Run],
     given: tuple[dict, dict, dict], effects: Mapping[str, Any] | None,
-) -> DeclaredModel:  # fmt: skip
+) -> StudyModel:  # fmt: skip
     """Return the law with its modes, and what of them is free."""
     bounds, start, fixed = given
     own = LAWS[law].parameters
@@ -231,7 +231,7 @@ def _estimated_mode(runs: Sequence[Run]) -> tuple[float, float]:
 
 
 def _names_and_ranges(
-    model: AugmentedModel, declared: DeclaredModel, bounds: Bounds
+    model: AugmentedModel, declared: StudyModel, bounds: Bounds
 ) -> tuple[dict[int, str], dict[int, tuple[float, float]]]:
     """Return the names of the free constants, and the ranges that bounds narrow, by position."""
     names, ranges = {}, {}
@@ -263,7 +263,7 @@ def _names_and_ranges(
     return names, ranges
 
 
-def _size(declared: DeclaredModel, position: int) -> float:
+def _size(declared: StudyModel, position: int) -> float:
     """Return the modulus or time of one mode; 1 where one factor on several is fitted."""
     values = (declared.modulus, declared.relaxation_time)[position]
     return float(values[0]) if len(values) == 1 else 1.0
@@ -274,7 +274,7 @@ def _starts(
     names: Mapping[int, str],
     free: Sequence[int],
     start: Mapping[str, float],
-    declared: DeclaredModel,
+    declared: StudyModel,
 ) -> list[Float[np.ndarray, " p"]]:
     """Return where the fit starts: as declared, and spread over the ranges."""
     first = np.clip(model.zero(), model.low, model.high)
@@ -308,7 +308,7 @@ def _starts(
 
 
 def _constants(
-    model: AugmentedModel, fit: Fit, names: Mapping[int, str], declared: DeclaredModel
+    model: AugmentedModel, fit: Fit, names: Mapping[int, str], declared: StudyModel
 ) -> tuple[Constant, ...]:
     """Return the fitted constants in their units; of several modes the factor on them."""
     units = {

@@ -4,13 +4,7 @@
 declared law, then those of every candidate effect. At zero amplitude an effect changes nothing.
 """
 
-from discover.forward.augmented_model import (
-    AugmentedModel,
-    Linearised,
-    Point,
-    linearised,
-    widths_of,
-)
+from discover.forward.augmented_model import AugmentedModel
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 from discover.forward.flows import Batch, TransientFlows, make_batch
 from discover.forward.records import (
@@ -30,15 +24,11 @@ __all__ = [
     "Batch",
     "DeclaredModel",
     "FreeParameter",
-    "Linearised",
-    "Point",
     "Records",
     "TransientFlows",
     "data_scales",
     "even",
-    "linearised",
     "make_batch",
     "make_records",
     "names_of_loadings",
-    "widths_of",
 ]

@@ -6,7 +6,6 @@ another program. All trial vectors go through one kernel (`discover.forward.side
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,50 +13,11 @@ from jaxtyping import Float
 
 from discover.effects import AbstractEffect, ModeEffect
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
-from discover.forward.flows import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
+from discover.forward.flows import Batch
 from discover.forward.program import Predictor, Trials, program_of
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
-
-# A steady state is solved for, a transient followed, a periodic state followed again and again
-_BY_SPEED = (SteadyFlows, TransientFlows, StressFlows, PeriodicFlows)
-
-
-_WIDTH = 1e-5
-"""Of a parameter, or of its first trial, by which it is moved."""
-
-_BEYOND = 1e-3
-"""By how much a move may lengthen the residuals, whose length is an error over the record."""
-
-
-class Linearised(NamedTuple):
-    """Weighted residuals at one vector, not finite where it diverges, and derivatives.
-
-    The derivatives are by the parameters at `positions`, in their units; behind them stand the
-    changes with each move of the moduli.
-    """
-
-    residual: Float[np.ndarray, "runs n"]
-    jacobian: Float[np.ndarray, "columns runs n"]
-    positions: tuple[int, ...]  # in the vector
-
-
-class Point(NamedTuple):
-    """A vector, the parameters to differentiate by, and its residuals where they are known.
-
-    `limit`: sum of squares beyond which the vector is of no use; see `AugmentedModel.residuals`.
-    """
-
-    theta: Float[np.ndarray, " p"]
-    positions: Sequence[int] = ()
-    residual: Float[np.ndarray, "runs n"] | None = None
-    limit: float = np.inf
-
-    @property
-    def size(self) -> int:
-        """How many vectors are predicted for it."""
-        return len(self.positions) + (self.residual is None)
 
 
 class AugmentedModel:
@@ -219,7 +179,9 @@ class AugmentedModel:
         return self._predicted(thetas, batch, moduli, normal=True)
 
     def _predicted(self, thetas, batch: Batch, moduli, normal: bool):
-        trials = self._trials(thetas, moduli=moduli)
+        if moduli is None:
+            moduli = np.broadcast_to(self.moduli, (len(thetas), len(self.moduli)))
+        trials = Trials(np.asarray(thetas, dtype=float), moduli)
         out = np.zeros((len(thetas), *batch.recorded.shape, 3 if normal else 1))
         for i, rows in enumerate(batch.rows):
             found = self._predictor.of_part(trials, batch, i, normal)
@@ -230,113 +192,3 @@ class AugmentedModel:
     def moduli(self) -> Float[np.ndarray, " c"]:
         """Moduli of the declared modes in Pa, and behind them the viscosity of the solvent."""
         return np.append(self.declared.modulus, float(self.declared.solvent_viscosity))
-
-    def _trials(self, thetas, limits: Any = np.inf, moduli=None) -> Trials:
-        if moduli is None:
-            moduli = np.broadcast_to(self.moduli, (len(thetas), len(self.moduli)))
-        limits = np.broadcast_to(limits, len(thetas))
-        return Trials(np.asarray(thetas, dtype=float), moduli, limits)
-
-    def residuals(
-        self,
-        thetas: Sequence[np.ndarray] | np.ndarray,
-        batch: Batch,
-        limits: Float[np.ndarray, " trials"] | None = None,
-        moduli: Float[np.ndarray, "trials c"] | None = None,
-    ) -> Float[np.ndarray, "trials runs n"]:
-        """Return the weighted residuals of parameter vectors; not finite where one fails.
-
-        Those of runs that are loadings of their own are what the factors of these leave.
-
-        `limits`: sums of squares from which on a vector is of no use: its residuals are infinite,
-        its runs not followed to the end, and slower tests not asked for.
-        """
-        if limits is None:
-            return batch.records.residual(self.predictions(thetas, batch, moduli))
-        trials, sums = self._trials(thetas, limits, moduli), np.zeros(len(thetas))
-        out = np.zeros((len(thetas), *batch.recorded.shape))
-        # a factor may lessen what a loading leaves on the way
-        ahead = np.inf if batch.records.loadings is not None else 1.0
-        parts = sorted(enumerate(batch.parts), key=lambda one: _BY_SPEED.index(type(one[1])))
-        for i, _ in parts:
-            asked = np.flatnonzero(sums < limits)
-            if not len(asked):
-                break
-            left = ahead * (limits[asked] - sums[asked])
-            some = trials.taken(asked)._replace(limits=left)
-            found = self._predictor.of_part(some, batch, i)[..., 0]
-            rows, n = batch.rows[i], found.shape[2]
-            off = batch.records.of_runs(rows, n).residual(found)
-            out[np.ix_(asked.tolist(), rows, range(n))] = off
-            with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
-                sums[asked] += np.sum(off**2, axis=(1, 2))
-        out[~(sums < limits)] = np.inf  # what is not a number among them
-        return out
-
-    def linearise(
-        self,
-        theta: Float[np.ndarray, " p"],
-        batch: Batch,
-        positions: Sequence[int] = (),
-        moves: Float[np.ndarray, "m c"] | None = None,
-    ) -> Linearised:
-        """Return the weighted residuals of a vector and their one-sided differences, from one call.
-
-        `positions`: parameters to differentiate by. `moves`: of the moduli in Pa and of the solvent
-        in Pa s; half the difference between each move and its opposite stands behind the
-        derivatives.
-        """
-        if moves is None or not len(moves):
-            return linearised(self, [Point(theta, positions)], batch)[0]
-        widths = widths_of(self, theta, positions)
-        vectors = np.tile(theta, (1 + len(widths) + 2 * len(moves), 1))
-        vectors[np.arange(1, 1 + len(widths)), list(positions)] += widths
-        still = np.zeros((1 + len(widths), len(self.moduli)))
-        moduli = self.moduli + np.concatenate([still, moves, -np.asarray(moves)])
-        found = self.residuals(vectors, batch, moduli=moduli)
-        base, moved, up, down = np.split(found, np.cumsum([1, len(widths), len(moves)]))
-        with np.errstate(invalid="ignore", over="ignore"):  # what ran away
-            by_parameters = (moved - base) / widths[:, None, None]
-            jacobian = np.concatenate([by_parameters, 0.5 * (up - down)])
-        return Linearised(base[0], jacobian, tuple(positions))
-
-
-def widths_of(
-    model: Any, theta: Float[np.ndarray, " p"], positions: Sequence[int]
-) -> Float[np.ndarray, " positions"]:
-    """Return by how much parameters are moved for a derivative, away from an upper bound."""
-    at = list(positions)
-    width = _WIDTH * np.maximum(np.abs(theta[at]), model.first_trial[at])
-    return np.where(theta[at] + width > model.high[at], -width, width)
-
-
-def linearised(model: Any, points: Sequence[Point], batch: Batch) -> list[Linearised]:
-    """Return residuals and derivatives at several vectors, from one call of an `AugmentedModel`."""
-    vectors, limits, widths = [], [], []
-    for point in points:
-        widths.append(widths_of(model, point.theta, point.positions))
-        if point.residual is None:
-            vectors.append(point.theta)
-        for position, width in zip(point.positions, widths[-1], strict=True):
-            moved = point.theta.copy()
-            moved[position] += width
-            vectors.append(moved)
-        limits += [(np.sqrt(point.limit) + _BEYOND) ** 2] * point.size
-        if point.residual is None:
-            limits[-point.size] = point.limit
-    if not vectors:
-        none = (np.zeros((0, *np.asarray(point.residual).shape)) for point in points)
-        return [_of(*one) for one in zip(points, none, widths, strict=True)]
-    known = np.array(limits)
-    ended = () if np.all(np.isinf(known)) else (known,)
-    found = model.residuals(np.array(vectors), batch, *ended)
-    ends = np.cumsum([point.size for point in points])[:-1]
-    each = zip(points, np.split(found, ends), widths, strict=True)
-    return [_of(point, rows, width) for point, rows, width in each]
-
-
-def _of(point: Point, rows: np.ndarray, widths: np.ndarray) -> Linearised:
-    base, moved = (rows[0], rows[1:]) if point.residual is None else (point.residual, rows)
-    with np.errstate(invalid="ignore", over="ignore"):  # what ran away
-        jacobian = (moved - base) / widths[:, None, None]
-    return Linearised(base, jacobian, tuple(point.positions))

@@ -9,18 +9,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from discover.forward.grid import IntegrationGrid, make_grids
 from discover.programs import on_device
-from discover.protocols.kinematics import MODULI, STATES, RecordedQuantity
+from discover.protocols.kinematics import MODULI, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 
 # Of its strain, what an oscillation keeps that is to be still: without any it has no modulus
 _SMALL_STRAIN = 1e-3
-
-# Numbers of steady and periodic states are rounded up to multiples of this
-_STATES = 8
 
 # What no sum of stresses is
 _NEVER = -1.23456789e300
@@ -46,11 +43,6 @@ class FlowBatch(eqx.Module):
 
     def __len__(self) -> int:
         return sum(map(len, self.shown))
-
-    @property
-    def sample_mask(self) -> Bool[Array, "runs n"]:
-        """False where a sample is padding."""
-        return self.over(lambda _, grid: grid.sample_mask)
 
     @property
     def n_steps(self) -> int:
@@ -84,20 +76,6 @@ class FlowBatch(eqx.Module):
             return found[0]
         order = np.argsort([one.run for shown in self.shown for one in shown])
         return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[order], *found)
-
-    def with_steps_in(self, multiple: int) -> "FlowBatch":
-        """Return the flows with steps rounded up, so that different runs share a compilation."""
-        parts = []
-        for protocols, grids in self.parts:
-            times = np.asarray(grids.times)
-            # a state costs many steps
-            few = min(multiple, _STATES) if protocols.control in STATES else multiple
-            more = -times.shape[1] % few
-            spacing = (times[:, -1] - times[:, -2])[:, None] if times.shape[1] > 1 else 1.0
-            added = times[:, -1:] + spacing * np.arange(1, more + 1)
-            longer = on_device(np.concatenate([times, added], axis=1))
-            parts.append((protocols, eqx.tree_at(lambda grid: grid.times, grids, longer)))
-        return FlowBatch(tuple(parts), self.shown)
 
     def faster(self, factor: Float[Array, " runs"]) -> "FlowBatch":
         """Return the flows with the rate of each multiplied; their grids stay.
@@ -208,12 +186,8 @@ def _is_one_flow(protocols, times, i: int, j: int) -> bool:
 
 
 def _with_samples(grids: IntegrationGrid, n: int) -> IntegrationGrid:
-    index, mask = np.asarray(grids.sample_index), np.asarray(grids.sample_mask)
+    index = np.asarray(grids.sample_index)
     more = ((0, 0), (0, n - index.shape[1]))
     if not more[1][1]:
         return grids
-    return replace(
-        grids,
-        sample_index=on_device(np.pad(index, more, mode="edge")),
-        sample_mask=on_device(np.pad(mask, more)),
-    )
+    return replace(grids, sample_index=on_device(np.pad(index, more, mode="edge")))

@@ -29,11 +29,11 @@ class RateSteps(eqx.Module):
     not fitted.
     """
 
-    start: Float[Array, "*runs steps"]
-    end: Float[Array, "*runs steps"]
-    change: Float[Array, "*runs steps"]  # of the rate in 1/s
-    share: Float[Array, "*runs steps"]
-    place: Int[Array, "*runs steps"]
+    start: Float[Array | np.ndarray, "*runs steps"]
+    end: Float[Array | np.ndarray, "*runs steps"]
+    change: Float[Array | np.ndarray, "*runs steps"]  # of the rate in 1/s
+    share: Float[Array | np.ndarray, "*runs steps"]
+    place: Int[Array | np.ndarray, "*runs steps"]
 
     def in_rate(
         self, rate: Float[Array, " m"], times: Float[Array, " m"], fitted: Float[Array, " fitted"]
@@ -73,7 +73,7 @@ class RateSteps(eqx.Module):
         fills = (_NEVER - 1.0, _NEVER, 0.0, 0.5, -1)
         return RateSteps(
             *(
-                on_device(np.pad(np.asarray(column), beyond, constant_values=fill))
+                np.pad(np.asarray(column), beyond, constant_values=fill)
                 for column, fill in zip(columns, fills, strict=True)
             )
         )
@@ -90,8 +90,7 @@ def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
         for k, step in enumerate(run.rate_steps):
             rows[i, k] = step.start, step.end, step.change, step.share
             place[i, k] = -1 if step.place is None else step.place
-    start, end, change, share = (on_device(column) for column in np.moveaxis(rows, -1, 0))
-    return RateSteps(start, end, change, share, on_device(place))
+    return RateSteps(*np.moveaxis(rows, -1, 0), place)
 
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
@@ -116,26 +115,18 @@ class TransientFlows(eqx.Module):
         has no periodic start.
     """
 
-    times: Float[Array, "runs m"]
-    commanded_rate: Float[Array, "runs m"]  # rate there, in 1/s
-    sample_index: Array  # position of the samples among step ends, shape (runs, n)
-    clock_factor: Float[Array, " runs"]  # shape (runs,)
-    strain_before: Float[Array, " runs"]
-    cycle: Int[Array, "runs 2"]
-    last_step: Int[Array, " runs"]
+    times: Float[Array | np.ndarray, "runs m"]
+    commanded_rate: Float[Array | np.ndarray, "runs m"]  # rate there, in 1/s
+    sample_index: Array | np.ndarray  # position of the samples among step ends, shape (runs, n)
+    clock_factor: Float[Array | np.ndarray, " runs"]  # shape (runs,)
+    strain_before: Float[Array | np.ndarray, " runs"]
+    cycle: Int[Array | np.ndarray, "runs 2"]
+    last_step: Int[Array | np.ndarray, " runs"]
     kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
     # whether vectors may choose their steps while the rate is a straight line
     own_widths: bool = eqx.field(static=True, default=True)
-
-    @property
-    def longest(self) -> float:
-        """Time of the last sample of all, in s."""
-        ends = np.take_along_axis(
-            np.asarray(self.times)[:, ::2], np.asarray(self.sample_index), axis=1
-        )
-        return float(np.max(ends))
 
     def in_shared_shape(self) -> "TransientFlows":
         """Return these runs padded to one of few shapes, so that data sets share programs."""
@@ -151,7 +142,7 @@ class TransientFlows(eqx.Module):
         one_more = (2.0 * rate[:, -1:] - rate[:, [-2, -3]])[:, : later.shape[1]]
         longer = replace(
             self,
-            times=on_device(np.concatenate([times, later], axis=1)),
+            times=np.concatenate([times, later], axis=1),
             commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), half_steps),
             sample_index=_longer(self.sample_index, samples, "edge"),
             steps=self.steps and self.steps.padded(_rounded(self.steps.start.shape[1], 1)),
@@ -168,15 +159,17 @@ def _rounded(size: int, least: int) -> int:
     return least
 
 
-def _longer(values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant") -> Array:
+def _longer(
+    values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant"
+) -> np.ndarray:
     beyond = size - np.shape(values)[1]
-    return on_device(np.pad(np.asarray(values), ((0, 0), (0, beyond)), mode))
+    return np.pad(np.asarray(values), ((0, 0), (0, beyond)), mode)
 
 
-def _more_runs(values: ArrayLike, runs: int) -> Array:
+def _more_runs(values: ArrayLike, runs: int) -> np.ndarray:
     values = np.asarray(values)
     more = [(0, runs - len(values)), *[(0, 0)] * (values.ndim - 1)]
-    return on_device(np.pad(values, more, "edge"))
+    return np.pad(values, more, "edge")
 
 
 class Steps(NamedTuple):
@@ -243,7 +236,7 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
                 np.asarray(len(grid) - 1),
             )
         )
-    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
+    columns = [np.stack(column) for column in zip(*rows, strict=True)]
     return TransientFlows(
         *columns,
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
@@ -264,12 +257,6 @@ class StressFlows(eqx.Module):
     sample_index: Array
     clock_factor: Float[Array, " runs"]
     kinematics: Kinematics | None = None
-
-    @property
-    def longest(self) -> float:
-        """Time of the last sample of all, in s."""
-        ends = np.take_along_axis(np.asarray(self.times), np.asarray(self.sample_index), axis=1)
-        return float(np.max(ends))
 
 
 def at_given_stress(runs: Sequence[Run], steps: Steps) -> StressFlows:
@@ -299,11 +286,6 @@ class SteadyFlows(eqx.Module):
     rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
     kinematics: Kinematics | None = None  # as in `TransientFlows`
 
-    @property
-    def longest(self) -> float:
-        """Zero: a steady state knows no time."""
-        return 0.0
-
 
 def steady_states(runs: Sequence[Run]) -> SteadyFlows:
     """Return the flows of flow curves."""
@@ -330,11 +312,6 @@ class PeriodicFlows(eqx.Module):
     strain: Float[Array, " states"]
     frequency: Float[Array, " states"]
     steps: Int[Array, " states"]  # of half a cycle: more at large strain
-
-    @property
-    def longest(self) -> float:
-        """Zero: a periodic state knows no time since it began."""
-        return 0.0
 
 
 def oscillations(runs: Sequence[Run], each: Steps) -> tuple[PeriodicFlows, tuple[Places, ...]]:
@@ -401,15 +378,6 @@ class Batch(eqx.Module):
     def recorded(self) -> Float[np.ndarray, "runs n"]:
         """What was recorded, in Pa or as a strain."""
         return np.asarray(self.records.recorded)
-
-    @property
-    def longest(self) -> float:
-        """Time of the last sample of all, in s."""
-        return max(part.longest for part in self.parts)
-
-    def without_factors(self) -> "Batch":
-        """Return a batch whose residuals are those of predictions, without factors of loadings."""
-        return replace(self, records=self.records.without_factors())
 
 
 def make_batch(runs: Sequence[Run], strain_step: float = 0.25, **how: Any) -> Batch:

@@ -26,7 +26,6 @@ from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
-from tensor_library.algebra import VelocityGradient
 
 Numbers = TypeVar("Numbers")
 
@@ -48,13 +47,12 @@ class AtSamples(NamedTuple):
 
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
     """Return what is seen of a fluid in one flow. Not finite where it runs away."""
-    if protocol.control in FOLLOWED:
-        states = _at_given_rate(fluid, protocol, grid, lambda stress, _: stress.T)
-        rate = jax.vmap(protocol.rate)(grid.sample_times)
-        gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
-        stress = jax.vmap(fluid.stress)(states, gradient)
-        return AtSamples(_observed(stress, protocol), states, rate)
-    return solved_on_grid(partial(dynamics_of_fluid, protocol=protocol), fluid, protocol, grid)
+    make = partial(dynamics_of_fluid, protocol=protocol)
+    if protocol.control not in FOLLOWED:
+        return solved_on_grid(make, fluid, protocol, grid)
+    states = _followed(make, fluid, protocol, grid, lambda stress, _: stress.T)
+    rate = jax.vmap(protocol.rate)(grid.sample_times)
+    return AtSamples(_of_states(fluid, states, protocol, grid), states, rate)
 
 
 def observed_on_grid(
@@ -63,10 +61,19 @@ def observed_on_grid(
     grid: IntegrationGrid,
     adjoint: Any = None,
 ) -> Inexact[Array, "n 3"]:
-    """Return what `AtSamples.observed` holds, at the samples of one grid."""
-    if protocol.control in FOLLOWED:
-        return _observed(solve_on_grid(fluid, protocol, grid, adjoint), protocol)
-    return at_samples(fluid, protocol, grid).observed
+    """Return what `AtSamples.observed` holds, at the samples of one grid.
+
+    `adjoint`: how diffrax differentiates in reverse mode. None is for values and forward mode: the
+    same steps, traced and compiled in a third of the time.
+    """
+    make = partial(dynamics_of_fluid, protocol=protocol)
+    if adjoint is None or protocol.control != "rate":
+        return observed_of_dynamics(make, fluid, fluid, protocol, grid)
+    start = begun(make(fluid), make(without_derivatives(fluid)), protocol, grid)
+    from discover.forward.by_diffrax import followed_in_reverse  # diffrax takes a second to load
+
+    modes = followed_in_reverse(dynamics_of_fluid, fluid, protocol, grid, start, adjoint)
+    return _of_states(fluid, jnp.swapaxes(modes, 1, 2), protocol, grid)
 
 
 def observed_of_dynamics(
@@ -82,45 +89,16 @@ def observed_of_dynamics(
     """
     if protocol.control not in FOLLOWED:
         return solved_on_grid(make, numbers, protocol, grid).observed
-    fixed = make(without_derivatives(numbers))
-    observe = partial(_stress_of_modes, fluid)
-    return _observed(follow(make(numbers), fixed, protocol, grid, observe), protocol)
+
+    # the sum at every step, for all modes with many derivatives beside them are large
+    def observe(stress, rate):
+        return fluid.stress(stress.T, rate)
+
+    return _observed(_followed(make, numbers, protocol, grid, observe), protocol)
 
 
-def _stress_of_modes(fluid: Fluid, stress: Float[Array, "s k"], rate: VelocityGradient):
-    return fluid.stress(stress.T, rate)
-
-
-def solve_on_grid(
-    fluid: Fluid,
-    protocol: FlowProtocol,
-    grid: IntegrationGrid,
-    adjoint: Any = None,
-) -> Float[Array, "n 4"]:
-    """Return σ11, σ22, σ33, σ12 in Pa at the samples of one grid, at a given rate.
-
-    `adjoint`: how diffrax differentiates in reverse mode. None is for values and forward mode: the
-    same steps, traced and compiled in a third of the time.
-    """
-    if adjoint is None or protocol.control == "steady":
-        return _at_given_rate(fluid, protocol, grid, partial(_stress_of_modes, fluid))
-    start = begun(*_with_fixed(fluid, protocol), protocol, grid)
-    from discover.forward.by_diffrax import followed_in_reverse  # diffrax takes a second to load
-
-    modes = followed_in_reverse(dynamics_of_fluid, fluid, protocol, grid, start, adjoint)
-    gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
-    return jax.vmap(fluid.stress)(jnp.swapaxes(modes, 1, 2), gradient)
-
-
-def _at_given_rate(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, observe: Observe):
-    return follow(*_with_fixed(fluid, protocol), protocol, grid, observe)
-
-
-def _with_fixed(fluid: Fluid, protocol: FlowProtocol) -> tuple[Dynamics, Dynamics]:
-    """Return a fluid as the integrators take it, and once more without derivatives."""
-    return dynamics_of_fluid(fluid, protocol), dynamics_of_fluid(
-        without_derivatives(fluid), protocol
-    )
+def _followed(make, numbers, protocol: FlowProtocol, grid: IntegrationGrid, observe: Observe):
+    return follow(make(numbers), make(without_derivatives(numbers)), protocol, grid, observe)
 
 
 def solved_on_grid(
@@ -163,6 +141,11 @@ def _at_given_stress(
     s11, s22, s33, _ = jnp.tensordot(states[:, :4], dynamics.modes.modulus, axes=1).T
     observed = jnp.stack([strain, s11 - s22, s22 - s33], axis=-1)
     return AtSamples(observed, jnp.swapaxes(states, 1, 2), rate)
+
+
+def _of_states(fluid, states: Float[Array, "n k s"], protocol: FlowProtocol, grid) -> Array:
+    gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
+    return _observed(jax.vmap(fluid.stress)(states, gradient), protocol)
 
 
 def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Array, "n 3"]:

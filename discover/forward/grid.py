@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 from scipy.optimize import isotonic_regression
 
 from discover.errors import InputError
@@ -140,7 +140,6 @@ class IntegrationGrid(eqx.Module):
 
     times: Float[Array, "*batch s"]
     sample_index: Int[Array, "*batch n"]
-    sample_mask: Bool[Array, "*batch n"]  # false where a sample is padding, shape (n,)
     phase: Float[Array, "*batch m"] | None = None
     cycle: Int[Array, "*batch"] | None = None
     cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
@@ -368,19 +367,16 @@ def make_grids(
     cycle_steps = -(-int(max(cycles)) // _STEPS_OF_CYCLE) * _STEPS_OF_CYCLE
     n_steps = max(max(len(g) for g, _ in grids), cycle_steps + 1, 2)
     n_samples = max(len(i) for _, i in grids)
-    stacked = [], [], []
+    stacked = [], []
     for grid, index in grids:
         spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
         padding = grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)
         stacked[0].append(np.concatenate([grid, padding]))
         stacked[1].append(np.pad(index, (0, n_samples - len(index)), mode="edge"))
-        stacked[2].append(np.arange(n_samples) < len(index))
     columns = [on_device(np.stack(s)) for s in stacked]
     if protocols[0].control != "oscillation":
         cycle = on_device(np.array(cycles)) if cycle_steps else None
-        return IntegrationGrid(
-            columns[0], columns[1], columns[2], cycle=cycle, cycle_steps=cycle_steps
-        )
+        return IntegrationGrid(*columns, cycle=cycle, cycle_steps=cycle_steps)
     largest = max(float(np.max(np.asarray(p.table_strains))) for p in protocols)
     # a cycle of so large steps errs by 5e-6 of the moduli at a strain of 10 (tested), and one of
     # twice these, on a rough grid, by sixteen times as much
@@ -389,7 +385,7 @@ def make_grids(
     step /= limits.get("pieces", 1)
     phase = half_cycle(largest, step)
     phases = on_device(np.tile(phase, (len(grids), 1)))
-    return IntegrationGrid(columns[0], columns[1], columns[2], phases)
+    return IntegrationGrid(*columns, phases)
 
 
 def half_cycle(strain: float, strain_step: float) -> Float[np.ndarray, " m"]:

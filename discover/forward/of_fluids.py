@@ -18,14 +18,19 @@ from discover.forward.declared import DeclaredModel, Structure
 from discover.forward.flows import Batch, PeriodicFlows, make_batch
 from discover.forward.grid import STRAIN_STEP, had_gone_on
 from discover.forward.program import Predictor, Trials, program_of
+from discover.forward.side_by_side import MadeOnce
+from discover.laws.each_mode import law_of_mode
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import FOLLOWED, MODULI
-from discover.protocols.protocol import FlowProtocol, shear_rates, strains_in_table
+from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates, strains_in_table
 
 # Change on halving every step, relative to the size of a run, up to which steps are short enough
 # for chains as they retract, and the most pieces that a step is cut into
 _TOLERANCE, _MOST_PIECES = 1e-4, 8
+
+# σ11, σ22, σ33 and σ12 of the rate of deformation, over L11, L22, L33 and L12
+_OF_RATE = np.array([2.0, 2.0, 2.0, 1.0])
 
 
 def bare_run(protocol: FlowProtocol, times: Float[np.ndarray, " n"], name: str = "run") -> Run:
@@ -53,7 +58,7 @@ def observed(fluids: Sequence[Fluid], batch: Batch) -> Float[np.ndarray, "fluids
 
     Not finite where a law runs away, or no state is reached.
     """
-    predictor, trials = _beside_each_other(fluids)
+    predictor, trials = _BESIDE(*fluids)
     out = np.zeros((len(fluids), *batch.recorded.shape, 3))
     for number, (part, rows) in enumerate(zip(batch.parts, batch.rows, strict=True)):
         found = predictor.of_part(trials, batch, number, normal=True)
@@ -75,13 +80,51 @@ def observed_in(
 
 
 def components(fluids: Sequence[Fluid], batch: Batch) -> Float[np.ndarray, "fluids runs n s"]:
-    """Return σ11, σ22, σ33, σ12 of the modes in Pa, without a solvent, in a batch of one part.
+    """Return σ11, σ22, σ33, σ12 of the modes in Pa, without a solvent, in flows at a given rate.
 
-    In transients the structure variables stand behind, summed as if they were stresses. Sweeps
-    have none.
+    The structure variables stand behind, summed as if they were stresses.
     """
-    predictor, trials = _beside_each_other(fluids)
-    return predictor.whole(trials, batch, 0)[..., 2:]
+    predictor, trials = _BESIDE(*fluids)
+    size = 4 + fluids[0].law.variables
+    out = np.zeros((len(fluids), *batch.recorded.shape, size))
+    for number, rows in enumerate(batch.rows):
+        found = predictor.whole(trials, batch, number)[..., 2:]
+        out[:, rows, : found.shape[2]] = found
+    return out
+
+
+def of_each_mode(fluid: Fluid, batch: Batch) -> Float[np.ndarray, "modes runs n s"]:
+    """Return the dimensionless states of each mode in flows at a given rate.
+
+    Nothing couples modes there: they are followed side by side, as fluids of one mode.
+    """
+    times = enumerate(np.asarray(fluid.relaxation_time))
+    alone = [Fluid(law_of_mode(fluid.law, number), 1.0, time) for number, time in times]
+    return components(alone, batch)
+
+
+def velocity_gradients(
+    protocol: FlowProtocol, rates: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 4"]:
+    """Return L11, L22, L33 and L12 in 1/s of a flow at some rates."""
+    flow = protocol.kinematics
+    gradient = np.array([0.0, 0.0, 0.0, 1.0]) if flow is None else np.asarray(flow.gradient)
+    return rates[:, None] * gradient
+
+
+def of_solvent(
+    fluid: Fluid, protocol: FlowProtocol, rates: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 4"]:
+    """Return σ11, σ22, σ33 and σ12 in Pa of a fluid's solvent in a flow at some rates."""
+    return float(fluid.solvent_viscosity) * velocity_gradients(protocol, rates) * _OF_RATE
+
+
+def recorded_and_normal(
+    protocol: FlowProtocol, stress: Float[np.ndarray, "n 4"]
+) -> Float[np.ndarray, "n 3"]:
+    """Return what is recorded of a stress in a flow, N1 and N2."""
+    s11, s22, s33, _ = stress.T
+    return np.stack([recorded_at(protocol, stress), s11 - s22, s22 - s33], axis=-1)
 
 
 def pieces_in_time(fluid: Fluid, runs: Sequence[Run], strain_step: float, **how: Any) -> int:
@@ -108,7 +151,7 @@ def pieces_in_time(fluid: Fluid, runs: Sequence[Run], strain_step: float, **how:
     return pieces if np.all(np.isfinite(coarse)) else 1
 
 
-def _beside_each_other(fluids: Sequence[Fluid]) -> tuple[Predictor, Trials]:
+def _beside_each_other(*fluids: Fluid) -> tuple[Predictor, Trials]:
     """Return what predicts fluids, and the vectors that they are to it."""
     laws = [in_shared_form(fluid.law) for fluid in fluids]
     if len({jax.tree.structure(law) for law in laws}) > 1:
@@ -121,8 +164,11 @@ def _beside_each_other(fluids: Sequence[Fluid]) -> tuple[Predictor, Trials]:
     thetas[:, 1] = np.log(times[:, 0] / times[0, 0])
     moduli = [np.append(fluid.modulus, fluid.solvent_viscosity) for fluid in fluids]
     declared = DeclaredModel(laws[0], np.asarray(first.modulus), times[0])
-    trials = Trials(thetas, np.array(moduli), np.full(len(fluids), np.inf))
-    return Predictor(declared, program, program), trials
+    return Predictor(declared, program, program), Trials(thetas, np.array(moduli))
+
+
+# flows of the same fluids are often asked for one after another
+_BESIDE = MadeOnce(_beside_each_other, kept=2)
 
 
 def _numbers_of(law: Any) -> Float[np.ndarray, " numbers"]:

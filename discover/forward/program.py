@@ -25,10 +25,10 @@ from discover.forward.flows import (
     at_radius,
 )
 from discover.forward.periodic_states import PHASE, first_harmonic
-from discover.forward.records import Records
 from discover.forward.side_by_side import (
     Asked,
     Kernel,
+    MadeOnce,
     PeriodicCode,
     PeriodicSideBySide,
     SideBySide,
@@ -42,9 +42,6 @@ from discover.forward.side_by_side import (
 from discover.laws import LAWS
 from discover.programs.threads import on_device
 from discover.protocols.kinematics import Kinematics, normal_stress_differences
-
-# Runs of which it is known whether vectors choose their steps in them
-_KEPT = 8
 
 
 class Program:
@@ -68,7 +65,8 @@ class Program:
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
-        self._known_parts: list[tuple[TransientFlows, bool]] = []
+        # whether runs have intervals in which vectors choose their steps
+        self._chooses_steps = MadeOnce(lambda part: bool(np.any(intervals(part)[0] > 1)))
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors of runs of one control at once."""
@@ -109,21 +107,6 @@ class Program:
             return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
         kernel = code_of(Kernel, *given, **choices)
         return SideBySide(self.fluid, kernel, self._rates, self._distorted, made_from)
-
-    def _chooses_steps(self, part: TransientFlows) -> bool:
-        """Return whether runs have intervals in which vectors choose their steps."""
-        for known, chooses in self._known_parts:
-            if known is part:
-                return chooses
-        found = bool(np.any(intervals(part)[0] > 1))
-        self._known_parts = [*self._known_parts[1 - _KEPT :], (part, found)]
-        return found
-
-    def are_judged_by_modes(self, thetas: Float[np.ndarray, "trials p"]) -> np.ndarray:
-        """Return whether nothing alters each record after the modes, or gives way in series."""
-        after = (*self._signal, *self.fluid.series, *self.averages)
-        at = [self.fluid.slices[effect.name].start for effect in after]
-        return ~np.any(thetas[:, at], axis=1)
 
     def _rates(self, theta, present, run):
         """Return the felt rate at half steps and the tool's at steps, by the effects present.
@@ -322,20 +305,10 @@ program_of = lru_cache(maxsize=16)(Program)
 
 
 class Trials(NamedTuple):
-    """Parameter vectors side by side, and the moduli and the limit of each."""
+    """Parameter vectors side by side, and the moduli of each."""
 
     thetas: Float[np.ndarray, "trials p"]
     moduli: Float[np.ndarray, "trials c"]
-    limits: Float[np.ndarray, " trials"]
-
-    def taken(self, which: np.ndarray) -> "Trials":
-        """Return some of them."""
-        return Trials(*(each[which] for each in self))
-
-
-_Piece = tuple[Flows, Records | None, int]
-"""Flows that a program follows at once, what judges them on the way, and how many of the runs are
-no padding."""
 
 
 class Predictor:
@@ -347,8 +320,9 @@ class Predictor:
     def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
-        self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
-        self._at_radii: list[tuple[Flows, RadialAverage, list[Batch] | None]] = []
+        # runs as a program takes them, and those at the radii of an average
+        self._in_shared_shape = MadeOnce(lambda part: part.in_shared_shape())
+        self._inside = MadeOnce(_inside)
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -397,12 +371,12 @@ class Predictor:
         found = self._at_rim(trials, batch, number, whole)
         for effect in self.program.averages:
             share = trials.thetas[:, self.program.fluid.slices[effect.name].start]
-            flows, there = self._inside(batch, number, effect), np.flatnonzero(share)
+            flows, there = self._inside(batch, batch.parts[number], effect), np.flatnonzero(share)
             if flows is None or not len(there):
                 continue
             is_modulus = isinstance(batch.parts[number], PeriodicFlows)
             weights = effect.of_modulus if is_modulus else effect.of_stress
-            some, rim = trials.taken(there), found[there, ..., 0]
+            some, rim = Trials(*(of[there] for of in trials)), found[there, ..., 0]
             mean = weights[-1] * rim
             for flow, weight in zip(flows, weights[:-1], strict=True):
                 if weight:  # a modulus on the axis has none, and no strain to be measured by
@@ -410,63 +384,43 @@ class Predictor:
             found[there, ..., 0] = rim + share[there, None, None] * (mean - rim)
         return found
 
-    def _inside(self, batch: Batch, number: int, effect: RadialAverage) -> list[Batch] | None:
-        """Return the flows of a part at each radius below the rim; None where there are none."""
-        part = batch.parts[number]
-        for known, by, flows in self._at_radii:
-            if known is part and by is effect:
-                return flows
-        inside = [at_radius(part, radius) for radius in effect.radii[:-1]]
-        flows = None
-        if all(one is not None for one in inside):
-            parts = [[one if of is part else of for of in batch.parts] for one in inside]
-            flows = [replace(batch, parts=tuple(own)) for own in parts]
-        self._at_radii.append((part, effect, flows))
-        del self._at_radii[:-_KEPT]
-        return flows
-
     def _at_rim(
         self, trials: Trials, batch: Batch, number: int, whole: bool
     ) -> Float[np.ndarray, "trials rows n kinds"]:
         """Return the records of a part without what averages over radii."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
-            found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)
-            return found[..., None]
+            return _of_sweeps(self._of_runs(trials, part, 0, False), batch.moduli)[..., None]
         if not isinstance(part, TransientFlows):
-            return self._of_piece(trials, (part, None, 0), whole)
-        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), whole)
+            return self._of_runs(trials, part, 0, whole)
         runs, samples = part.sample_index.shape
-        return found[:, :runs, :samples]
+        # without effects no program follows that others could share
+        shared = (
+            self._in_shared_shape(part) if self.of_every_effect.fluid.structure.effects else part
+        )
+        return self._of_runs(trials, shared, runs, whole)[:, :runs, :samples]
 
     def side_by_side(self, part: Flows) -> Any:
         """Return what predicts many vectors of a part at once."""
         return self.of_every_effect.side_by_side(self._numbers, part)
 
-    def _of_piece(
-        self, trials: Trials, piece: _Piece, whole: bool
+    def _of_runs(
+        self, trials: Trials, part: Flows, runs: int, whole: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
-        program, (part, judging, runs) = self.program, piece
-        judged = program.are_judged_by_modes(trials.thetas)
-        trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
-        beside = trials._replace(thetas=vectors)
-        asked = Asked(self._numbers, *beside, part=part, judging=judging, runs=runs, whole=whole)
+        asked = Asked(self._numbers, vectors, trials.moduli, part, runs, whole)
         return self.side_by_side(part).predict(asked)
 
-    def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
-        """Return runs, and what judges them, as a program takes them, laid out once."""
-        for known, records, piece in self._laid_out:
-            if known is part and records is batch.records:
-                return piece
-        flows = part.in_shared_shape()
-        judging = batch.records.of_runs(rows, part.sample_index.shape[1])
-        piece = flows, judging.padded(*flows.sample_index.shape), len(rows)
-        self._laid_out.append((part, batch.records, piece))
-        del self._laid_out[:-_KEPT]
-        return piece
+
+def _inside(batch: Batch, part: Flows, effect: RadialAverage) -> list[Batch] | None:
+    """Return the flows of a part at each radius below the rim; None where there are none."""
+    inside = [at_radius(part, radius) for radius in effect.radii[:-1]]
+    if any(one is None for one in inside):
+        return None
+    parts = [[one if of is part else of for of in batch.parts] for one in inside]
+    return [replace(batch, parts=tuple(own)) for own in parts]
 
 
 def _of_sweeps(

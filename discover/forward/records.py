@@ -50,11 +50,6 @@ class Loadings(eqx.Module):
         """The rows of each loading's records."""
         return tuple(tuple(np.flatnonzero(own).tolist()) for own in np.asarray(self.members))
 
-    def of_rows(self, rows: Sequence[int]) -> "Loadings":
-        """Return the loadings of some rows; those of one loading are all there, or none."""
-        at = list(rows)
-        return Loadings(self.members[:, at], self.deviation, self.noise[at])
-
     def whitened(
         self, residual: Float[Values, "*trials rows n"], predicted: Float[Values, "*trials rows n"]
     ) -> Float[Values, "*trials rows n"]:
@@ -232,28 +227,11 @@ class Records(eqx.Module):
     def __len__(self) -> int:
         return len(self.weight)
 
-    def of_runs(self, rows: Sequence[int], n: int | None = None) -> "Records":
-        """Return the records of some runs, and of these the first samples, in arrays of NumPy."""
-        at = list(rows)
-        own = None if self.loadings is None else self.loadings.of_rows(at)
-        return Records(self.recorded[at, :n], self.weight[at, :n], own)
-
-    def padded(self, runs: int, n: int) -> "Records":
-        """Return the records of the first runs, in arrays of JAX with zeros up to a size."""
-        some = (self.recorded[:runs], self.weight[:runs])
-        more = [(0, runs - len(some[0])), (0, n - some[0].shape[1])]
-        recorded, weight = (on_device(np.pad(values, more)) for values in some)
-        return Records(recorded, weight)
-
     def of_one_kind(self) -> "Records":
         """Return the records of the first kind alone, without an axis of kinds."""
         parts = (self.recorded, self.weight)
         recorded, weight = (_by_numpy(lambda values: values[..., 0], part) for part in parts)
         return replace(self, recorded=recorded, weight=weight)
-
-    def without_factors(self) -> "Records":
-        """Return the records as if all runs were of one loading."""
-        return replace(self, loadings=None)
 
     def residual(
         self, predicted: Float[Values, "*trials_and_records"]
@@ -271,13 +249,6 @@ class Records(eqx.Module):
         weighted = _looked_at(seen, self.weight * predicted)
         left = self.loadings.whitened(off.reshape(rows), weighted.reshape(rows))
         return left.reshape(off.shape)
-
-    def weighted(self, predicted: Float[Array, "runs n *kinds"]) -> Float[Array, "runs n *kinds"]:
-        """Return weighted predictions, in units of the records; zero where none is looked at.
-
-        Of runs that are loadings of their own with the factors that their records suggest.
-        """
-        return self.residual(predicted) + self.weight * self.recorded
 
     def linearised(
         self, predicted: Float[Array, "runs n *kinds"], columns: Float[Array, "runs n *kinds p"]

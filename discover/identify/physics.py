@@ -91,6 +91,7 @@ class Seen:
     deborah: float
     along: physics_flows.Trajectories  # the flows asked for
     beyond: physics_flows.Cycles
+    in_cycles: physics_flows.Trajectories  # these
     work: Float[np.ndarray, " cycles"]  # of each of these cycles
 
 
@@ -98,7 +99,7 @@ def see(
     fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]],
     weissenberg: float, deborah: float,
 ) -> Seen:  # fmt: skip
-    """Return what a fluid does along flows, and what its checks need beside, by one program.
+    """Return what a fluid does along flows, and what its checks need beside.
 
     `times`: of samples in s. `weissenberg`, `deborah`: as of `Seen`.
     """
@@ -111,14 +112,20 @@ def see(
         fluid, [*protocols, *beyond.protocols], [*times, *beyond.times]
     )
     count = len(protocols)
-    work = beyond.work([observed[:, 0] for observed in found.observed[count:]])
-    return Seen(fluid, weissenberg, deborah, found.some(range(count)), beyond, work)
+    along = found.some(range(count))
+    in_cycles = found.some(range(count, len(found.observed)))
+    work = beyond.work([observed[:, 0] for observed in in_cycles.observed])
+    return Seen(fluid, weissenberg, deborah, along, beyond, in_cycles, work)
 
 
 def check_physics(seen: Seen, names: Mapping[int, str]) -> PhysicsReport:
     """Return the checks of a fluid. `names`: of the flows along which stresses are looked at."""
     fluid = replace(seen.fluid, law=in_shared_form(seen.fluid.law))
     along, titles = seen.along.some(list(names)), list(names.values())
+    if not np.any(np.isfinite(along.smallest_conformation)):
+        # creep and sweeps tell of no mode: cycles at the rate of training do
+        titles = list(seen.beyond.names[:_PER_RATE])
+        along = seen.in_cycles.some(range(_PER_RATE))
     times = np.asarray(fluid.relaxation_time)
     rates = SHEAR_RATES / physics_flows.time_scale(fluid)
     shear = [

@@ -12,7 +12,8 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.forward.of_fluids import bare_run, observed
-from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
+from discover.laws.expansion import expansion_of
 from discover.programs import on_device
 from discover.protocols.protocol import (
     FlowProtocol,
@@ -54,17 +55,8 @@ def stresses_of_laws(
     names = {name for law in laws for name in law.coefficients}
     used = [term for term in library.terms if term.name in names] or library.terms[:1]
     used = TermLibrary(tuple(used))
-    fluids = []
-    for law in laws:
-        coefficients, inner = law.over(used)
-        whole = LibraryExpansion(
-            coefficients=on_device(coefficients),
-            inner=on_device(inner),
-            library=used,
-            linear_relaxation=base.linear_relaxation,
-            base=base,
-        )
-        fluids.append(Fluid.dimensionless(whole))
+    relaxes = base.linear_relaxation
+    fluids = [Fluid.dimensionless(expansion_of(law, used, relaxes, base)) for law in laws]
     batch = make_batch(runs, strain_step, longest=longest_step(base), own=False)
     return observed(fluids, batch)
 

@@ -33,8 +33,9 @@ from discover.identify.side_by_side import joint_library
 from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
+from discover.laws.expansion import expansion_of, law_of_terms
 from discover.learners.runs import as_runs
-from discover.programs import compiled, on_device
+from discover.programs import compiled
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
@@ -248,14 +249,7 @@ def _at(
 ) -> LawStructure | None:  # fmt: skip
     """Return the structure at one law, or None where it diverges in these flows."""
     base = known.law
-    coefficients, inner = law.over(library)
-    whole = LibraryExpansion(
-        coefficients=on_device(coefficients),
-        inner=on_device(inner),
-        library=library,
-        linear_relaxation=base.linear_relaxation,
-        base=base,
-    )
+    whole = expansion_of(law, library, base.linear_relaxation, base)
     value, columns = with_sensitivities(whole, known, flows)
     shape = samples[..., None]
     stresses = np.where(shape, np.asarray(value)[:, : samples.shape[1]], 0.0)
@@ -276,7 +270,9 @@ def _at(
     with_n1 = list(dict.fromkeys([*observed, "N1"]))
     left, _ = _directions(library, blocks, with_n1, total)
     numbers = range(known.n_modes) if differs_by_mode(base) else [0]
-    of_modes = [hidden_stresses(law_of_mode(whole, number)) for number in numbers]
+    # without terms that are zero: what a program differentiates it takes long to compile
+    alone = law_of_terms(law, base.linear_relaxation, base)
+    of_modes = [hidden_stresses(law_of_mode(alone, number)) for number in numbers]
     hidden = max(of_modes, key=lambda one: len(one.unfelt))
     verdicts = tuple(
         _verdict(q, list(observed), exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES

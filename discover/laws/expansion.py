@@ -67,14 +67,18 @@ def law_of_terms(
     Raises ValueError if a spelling is not canonical.
     """
     library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
-    coefficients, inner = terms.over(library)
-    return LibraryExpansion(
-        coefficients=on_device(coefficients),
-        inner=on_device(inner),
-        library=library,
-        linear_relaxation=linear_relaxation,
-        base=base,
-    )
+    return expansion_of(terms, library, linear_relaxation, base)
+
+
+def expansion_of(
+    terms: LawTerms,
+    library: TermLibrary,
+    linear_relaxation: bool,
+    base: AbstractConstitutiveLaw | None = None,
+) -> LibraryExpansion:
+    """Return the law of some terms of a library, added to the extra term of `base`."""
+    coefficients, inner = map(on_device, terms.over(library))
+    return LibraryExpansion(coefficients, inner, library, linear_relaxation, base)
 
 
 # terms searched for by default, so that what is found shares programs with what is known

@@ -16,7 +16,6 @@ from discover.answer import (
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
-from discover.dataset.run import TEMPERATURE
 from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
@@ -101,6 +100,7 @@ def loop_answer(result: Any) -> Answer:
         tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         failed=_failed(result),
         alternative=_alternative(result),
+        best_classical=_best_classical(result),
         tolerance=result.tolerance,
         temperature_C=result.temperature_C,
         shift_factors=_shift_factors(result.records),
@@ -120,13 +120,8 @@ def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
     Relaxation times there over those at the temperature to which runs were shifted: times of the
     instrument over those of the law.
     """
-    found = {}
-    for record in records:
-        told = (record.conditions.get(key) for key in TEMPERATURE)
-        at = next((one for one in told if one is not None), None)
-        end = len(record.time) - 1
-        if at is not None and record.time[end] != record.instrument_time[end]:
-            found[float(round(at))] = float(record.instrument_time[end] / record.time[end])
+    shifted = [record for record in records if record.shift != 1.0]
+    found = {one.temperature_C: one.shift for one in shifted if one.temperature_C is not None}
     return dict(sorted(found.items(), reverse=True))
 
 
@@ -196,23 +191,24 @@ def _failed(result: Any) -> str:
 
 
 def _alternative(result: Any) -> str:
-    """Return what comes next: a law of the field for a sum without a name, or the next likeliest.
-
-    Empty where the law is settled.
-    """
+    """Return which explanation is the next likeliest; empty where the law is settled."""
     told = result.explanations
     own = told.holding([stage.effect for stage in result.stages])
     if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
         others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
         after = f"; next: {others[0] or 'the declared model'}" if others else ""
         return f"Probability of this law {percent_of(own.probability)}{after}."
-    if result.nearest_law is None:
-        return ""
-    near = result.nearest_law
+    return ""
+
+
+def _best_classical(result: Any) -> tuple[str, float] | None:
+    """Return the best law of the field, in words, and its error, for a sum without a name."""
+    if (near := result.nearest_law) is None:
+        return None
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     maximum = " (flow curve with a maximum)" if _has_maximum(near) else ""
-    return f"Best classical law: {', '.join(said)}{maximum}, error {percent_of(near.size)}."
+    return f"{', '.join(said)}{maximum}", near.size
 
 
 _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
@@ -297,7 +293,22 @@ def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[C
 def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     """Return the constants of an effect that was added, with letters that no other has."""
     letters = result.letters.get(stage.effect, {})
-    return _constants(stage.parameters, stage.left_open, stage.effect, letters)
+    found = _constants(stage.parameters, stage.left_open, stage.effect, letters)
+    if stage.kind != "constitutive" or stage.effect in (*LAW_OF_EFFECT, *STRUCTURES):
+        return found
+    first, *others = found
+    meaning = "; ".join(filter(None, [first.said, f"odds for it {_odds(stage.evidence)}"]))
+    return replace(first, meaning=meaning), *others
+
+
+def _odds(evidence: float) -> str:
+    """Return odds for an effect that was added, of twice their logarithm."""
+    odds = float(np.exp(min(0.5 * evidence, 10.0)))
+    return f"> {_SURE}:1" if odds > _SURE else f"{significant(odds, 2)}:1"
+
+
+_SURE = 1000
+"""Odds from which on more say no more."""
 
 
 def _constants(

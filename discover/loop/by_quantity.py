@@ -9,8 +9,9 @@ from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError, sentences
 from discover.answer.sentences import MUCH
+from discover.loop.fitted_range import by_temperature
 from discover.loop.run_record import RunRecord
-from discover.words import percent_of
+from discover.words import listed, percent_of
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
@@ -209,10 +210,13 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
 
 
 def _measured_at(fast: Sequence[RunRecord]) -> str:
-    """Return at which rate runs beyond the range were measured."""
-    rates = [record.fastest for record in fast]
-    ends = sentences.span((min(rates), max(rates))) if rates else ""
-    return f"{sentences.MEASURED_AT} {ends} 1/s" if rates else ""
+    """Return at which rate runs beyond the range were measured, and at which temperature."""
+    told = []
+    for at, own in (by_temperature(fast) or {None: fast}).items():
+        rates = [record.fastest for record in own]
+        place = "" if at is None else f" at {sentences.degrees(at)}"
+        told += [f"{sentences.span((min(rates), max(rates)))} 1/s{place}"] if rates else []
+    return f"{sentences.MEASURED_AT} {listed(told)}" if told else ""
 
 
 def _is(record: RunRecord, kind: str) -> bool:

@@ -1,6 +1,7 @@
 """The flows of the fitted runs, in numbers: where a law was learned."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,13 +20,32 @@ _AT_REST = 1e-3
 """Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop."""
 
 
+def by_temperature(records: Sequence[RunRecord]) -> dict[float, list[RunRecord]]:
+    """Return runs as the instrument had them by temperature in °C, the hottest first.
+
+    Empty where none was shifted to another temperature, or where the temperature of one is unknown.
+    """
+    found: dict[float, list[RunRecord]] = {}
+    for record in records:
+        if (at := record.temperature_C) is None:
+            return {}
+        found.setdefault(at, []).append(record.unshifted)
+    shifted = any(record.shift != 1.0 for record in records)
+    return dict(sorted(found.items(), reverse=True)) if shifted else {}
+
+
 def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> Range:
     """Return the flows of the fitted runs, in numbers without units if the equation has them.
 
     Of a flow curve each sample counts, of an oscillation the amplitude, of other runs the largest
-    rate and the smallest at which the run stays.
+    rate and the smallest at which the run stays. Of shifted runs also by temperature, unshifted.
     """
     fitted = [record for record in records if not record.held_out]
+    measured = {at: _range(own, None) for at, own in by_temperature(fitted).items()}
+    return replace(_range(fitted, equation), by_temperature=measured)
+
+
+def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
     flows = tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",)
     strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
     strain = (0.0, max(strains)) if strains else None

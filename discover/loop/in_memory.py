@@ -8,17 +8,19 @@ import numpy as np
 
 from discover.answer import TOLERANCE
 from discover.dataset import Dataset
-from discover.dataset.run_table import temperature_of
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.loop.loop import run_loop_on
+from discover.loop.loop import run_study
 from discover.loop.loop_result import LoopResult
 from discover.progress import Progress, checked
-from discover.study.declared_model import forward_model
-from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
-from discover.study.schema import Loop, Verdict
-from discover.validation import validated
-from discover.words import counted, unknown_name
+from discover.study.in_memory import (
+    HeldOut,
+    data_in_memory,
+    declared_fluid,
+    study_in_memory,
+    with_known,
+)
+from discover.words import unknown_name
 
 _OPTIONS = {
     "effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws", "loading",
@@ -86,37 +88,20 @@ def close_loop(
     unknown = sorted(set(options) - _OPTIONS)
     if unknown:
         raise InputError(unknown_name("option", unknown[0], sorted(_OPTIONS), "close_loop"))
-    asked = _checked(options)
-    good_enough = validated(Verdict, {"tolerance": tolerance}, "close_loop()").tolerance
-    divided = data_in_memory(data, held_out)
-    fluid = declared_fluid(base, data)
-    declared = forward_model(with_known(fluid, known_effects, free, by_mode))
-    options["max_effects"] = asked.max_effects
-    result = run_loop_on(divided, declared, checked(progress), **options)
-    judged = "each held out in turn" if divided.each else f"{len(divided.held_out)} held out"
-    summary = (
-        f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
-        f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
-    ).strip()
-    return replace(
-        result,
-        title=data.name,
-        described=summary,
-        tolerance=good_enough,
-        temperature_C=temperature_of(data),
-    )
-
-
-def _checked(options: Mapping[str, Any]) -> Loop:
-    """Return the options as a study would hold them."""
-    content = dict(options)
-    laws, effects = content.pop("laws", ()), content.get("effects")
+    laws, effects, strain = (options.pop(key, None) for key in ("laws", "effects", "strain"))
     if isinstance(laws, str):
         raise InputError(f"laws must be a list of names; got {laws!r}. Write [{laws!r}].")
     if not (effects is None or isinstance(effects, str | Iterable)):
         raise InputError(f"effects must be 'named' or a list of effects; got {effects!r}.")
-    if effects is not None and not isinstance(effects, str):
-        content["effects"] = [getattr(effect, "name", effect) for effect in effects]
-    if isinstance(content.get("strain"), np.ndarray):
-        content["strain"] = content["strain"].tolist()
-    return validated(Loop, content, "close_loop()")
+    if strain is not None:
+        options["strain"] = strain.tolist() if isinstance(strain, np.ndarray) else strain
+    if effects is not None:
+        named = isinstance(effects, str)
+        effects = effects if named else list(effects)
+        options["effects"] = effects if named else [getattr(e, "name", e) for e in effects]
+    divided = data_in_memory(data, held_out)
+    declared = with_known(declared_fluid(base, data), known_effects, free, by_mode)
+    asked = {"loop": options, "verdict": {"tolerance": tolerance}}
+    study = study_in_memory(data, asked, "close_loop()")
+    declared = replace(declared, choice=tuple(laws or ()))
+    return run_study(study, divided, declared, checked(progress), effects)

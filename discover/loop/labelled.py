@@ -1,9 +1,11 @@
 """What a closed loop found, with the names of its dimensions: for xarray."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from discover.effects.registry import make_effect
 from discover.errors import InputError
@@ -12,11 +14,13 @@ from discover.plain_numbers import xarray_module
 if TYPE_CHECKING:
     import xarray
 
-    from discover.loop.parts import Explanation
     from discover.loop.run_record import RunRecord
 
 _UNEXPLAINED = "unexplained"
 _DECLARED = "declared"
+_NAMED = ("run", "role", "quantity")
+_NUMBERS = ("time_s", "strain", "rate_1_s")
+_VALUES = ("measured", "declared", "found", "low95", "high95")
 
 
 def labelled_loop(result: Any) -> "xarray.Dataset":
@@ -24,32 +28,40 @@ def labelled_loop(result: Any) -> "xarray.Dataset":
 
     Raises InputError if xarray is not installed.
     """
-    told = result.explanations
-    explanations = told.likeliest_first
-    found = dict(_found(result))
-    probabilities = [one.probability for one in explanations]
-    errors_fit = [one.error.fit for one in explanations]
-    errors_held_out = [one.error.held_out for one in explanations]
-    twins = ["; ".join(map(_joined, one.twins)) for one in explanations]
-    each = [_constants(one) for one in explanations]
+    told, explanations = result.explanations, result.explanations.likeliest_first
+    effects = [(e.effect, e.parameters) for e in (*result.declared_effects, *result.stages)]
+    found = _by_name([(_DECLARED, result.declared_parameters), *effects])
+    each = [_by_name(one.parameters.items()) for one in explanations]
     names = list(dict.fromkeys([*found, *(name for one in each for name in one)]))
-    unknown = (np.nan, np.nan)
-    values = [found.get(name, (np.nan, unknown)) for name in names]
-    intervals = np.array([interval or unknown for _, interval in values]).reshape(-1, 2)
+    known = [found.get(name) for name in names]
+    intervals = [(np.nan, np.nan) if one is None else one.ci95 or (np.nan, np.nan) for one in known]
+    low, high = np.array(intervals).reshape(-1, 2).T
+    # an effect given as an object is known by its stage alone; what is dimensionless has the unit 1
+    units = {}
+    for effect in dict.fromkeys(name for one in explanations for name in one.parameters):
+        with suppress(InputError):
+            units |= {f"{effect}.{p.name}": p.unit or "1" for p in make_effect(effect).parameters}
+    units |= {name: one.unit or "1" for name, one in found.items()}
+    errors = [one.error for one in explanations]
     variables = {
-        "probability": ("explanation", [*probabilities, told.unexplained_probability]),
-        "error_fit": ("explanation", [*map(_number, errors_fit), np.nan]),
-        "error_held_out": ("explanation", [*map(_number, errors_held_out), np.nan]),
+        "probability": [*(one.probability for one in explanations), told.unexplained_probability],
+        "error_fit": np.array([*(one.fit for one in errors), np.nan], dtype=float),
+        "error_held_out": np.array([*(one.held_out for one in errors), np.nan], dtype=float),
+    }
+    variables = {name: ("explanation", values) for name, values in variables.items()} | {
         "inclusion": ("effect", [*told.inclusion.values()]),
         "constant_by_explanation": (
             ("explanation", "constant"),
-            np.array([[one.get(n, np.nan) for n in names] for one in [*each, {}]]),
+            np.array([[one.get(n, np.nan) for n in names] for one in [*each, {}]], dtype=float),
         ),
-        "constant_found": ("constant", np.array([value for value, _ in values])),
-        "constant_low95": ("constant", intervals[:, 0]),
-        "constant_high95": ("constant", intervals[:, 1]),
+        "constant_found": (
+            "constant",
+            np.array([np.nan if one is None else one.value for one in known], dtype=float),
+        ),
+        "constant_low95": ("constant", low),
+        "constant_high95": ("constant", high),
     }
-    units = _units(result, explanations)
+    twins = ("; ".join(map(_joined, one.twins)) for one in explanations)
     coordinates = {
         "explanation": [*(_joined(one.effects) for one in explanations), _UNEXPLAINED],
         "twins": ("explanation", [*twins, ""]),
@@ -57,99 +69,40 @@ def labelled_loop(result: Any) -> "xarray.Dataset":
         "constant": np.array(names, dtype=str),
         "unit": ("constant", np.array([units.get(name, "") for name in names], dtype=str)),
     }
-    variables |= _predictions(result.records, len(explanations))
-    coordinates |= _samples(result.records)
+    if result.records:
+        table = pd.concat([_samples(record) for record in result.records])
+        predicted = [_by_explanation(record, len(explanations)) for record in result.records]
+        variables |= {name: ("sample", table[name].to_numpy()) for name in _VALUES}
+        variables["predicted"] = ("explanation", "sample"), np.concatenate(predicted, axis=1)
+        coordinates |= {name: ("sample", table[name].to_numpy(dtype=str)) for name in _NAMED}
+        coordinates |= {name: ("sample", table[name].to_numpy()) for name in _NUMBERS}
     attributes = {"verdict": result.verdict, "data": result.title}
     return xarray_module().Dataset(variables, coordinates, attributes)
 
 
-def _found(result: Any) -> Iterator[tuple[str, tuple[float, Any]]]:
-    """Yield the name of each constant of the model that was found, its value and its interval."""
-    for name, one in result.declared_parameters.items():
-        yield f"{_DECLARED}.{name}", (one.value, one.ci95)
-    for effect in (*result.declared_effects, *result.stages):
-        for name, one in effect.parameters.items():
-            yield f"{effect.effect}.{name}", (one.value, one.ci95)
+def _by_name(owners: Iterable[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
+    """Return what is said of each constant, by its owner and its name."""
+    return {f"{owner}.{name}": one for owner, own in owners for name, one in own.items()}
 
 
-def _constants(explanation: "Explanation") -> dict[str, float]:
-    return {
-        f"{effect}.{name}": float(value)
-        for effect, values in explanation.parameters.items()
-        for name, value in values.items()
-    }
+def _samples(record: "RunRecord") -> pd.DataFrame:
+    """Return what was measured and predicted of a run, one line a sample."""
+    low, high = (np.nan, np.nan) if record.band is None else record.band
+    return pd.DataFrame({
+        "run": record.name, "role": "held_out" if record.held_out else "fit",
+        "quantity": record.quantity, "time_s": record.time, "strain": record.strain,
+        "rate_1_s": record.rate, "measured": record.measured, "declared": record.predicted[0],
+        "found": record.predicted[-1], "low95": low, "high95": high,
+    })  # fmt: skip
 
 
-def _units(result: Any, explanations: Sequence["Explanation"]) -> dict[str, str]:
-    """Return the unit of each constant; an effect given as an object is known by its stage alone.
-
-    What is dimensionless has the unit 1.
-    """
-    units = {}
-    for effect in dict.fromkeys(name for one in explanations for name in one.parameters):
-        try:
-            of_effect = make_effect(effect).parameters
-        except InputError:
-            continue
-        units |= {f"{effect}.{p.name}": p.unit or "1" for p in of_effect}
-    for name, one in result.declared_parameters.items():
-        units[f"{_DECLARED}.{name}"] = one.unit or "1"
-    for effect in (*result.declared_effects, *result.stages):
-        units |= {f"{effect.effect}.{n}": one.unit or "1" for n, one in effect.parameters.items()}
-    return units
-
-
-def _predictions(
-    records: Sequence["RunRecord"], n_explanations: int
-) -> Mapping[str, tuple[Any, np.ndarray]]:
-    """Return what was measured and predicted, all samples of all runs one after the other."""
-    if not records:
-        return {}
-
-    def each(of_record) -> np.ndarray:
-        return np.concatenate([of_record(record) for record in records], axis=-1)
-
-    def nothing(record: "RunRecord", *shape: int) -> np.ndarray:
-        return np.full((*shape, len(record.time)), np.nan)
-
-    def by_explanation(record: "RunRecord") -> np.ndarray:
-        told = record.by_explanation
-        told = nothing(record, n_explanations) if told is None else told
-        return np.vstack([told, nothing(record)])
-
-    low, high = each(lambda r: nothing(r, 2) if r.band is None else r.band)
-    return {
-        "measured": ("sample", each(lambda r: r.measured)),
-        "declared": ("sample", each(lambda r: r.predicted[0])),
-        "found": ("sample", each(lambda r: r.predicted[-1])),
-        "predicted": (("explanation", "sample"), each(by_explanation)),
-        "low95": ("sample", low),
-        "high95": ("sample", high),
-    }
-
-
-def _samples(records: Sequence["RunRecord"]) -> dict[str, tuple[str, np.ndarray]]:
-    """Return the coordinates of the samples."""
-    sizes = [len(record.time) for record in records]
-    named = {
-        "run": [record.name for record in records],
-        "role": ["held_out" if record.held_out else "fit" for record in records],
-        "quantity": [record.quantity for record in records],
-    }
-    columns = {"time_s": "time", "strain": "strain", "rate_1_s": "rate"}
-    return {
-        **{name: ("sample", np.repeat(values, sizes)) for name, values in named.items()},
-        **{
-            name: ("sample", np.concatenate([getattr(record, of) for record in records]))
-            for name, of in columns.items()
-            if records
-        },
-    }
+def _by_explanation(record: "RunRecord", explanations: int) -> np.ndarray:
+    """Return what each explanation predicts of a run, and nothing for none of them."""
+    told = np.full((explanations + 1, len(record.time)), np.nan)
+    if record.by_explanation is not None:
+        told[:-1] = record.by_explanation
+    return told
 
 
 def _joined(effects: Sequence[str]) -> str:
     return " + ".join(effects) or _DECLARED
-
-
-def _number(value: float | None) -> float:
-    return np.nan if value is None else float(value)

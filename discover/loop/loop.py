@@ -29,7 +29,10 @@ from discover.loop.search_time import SearchTime
 from discover.loop.simple import inelastic_result, simple_result
 from discover.loop.task import Say, Task
 from discover.progress import STATES, Progress, by_time
-from discover.study.data import StudyData
+from discover.study.data import StudyData, temperature
+from discover.study.declared_model import StudyModel, forward_model
+from discover.study.schema import Study
+from discover.words import counted
 
 MOST_LISTED = 8
 """Explanations that are listed by default."""
@@ -98,33 +101,62 @@ def run_loop(
     return replace(result, seconds=time.perf_counter() - started)
 
 
-def run_loop_on(
+def run_study(
+    study: Study,
     data: StudyData,
-    declared: DeclaredModel,
-    progress: Progress | None,
-    max_effects: int,
-    **options: Any,
+    declared: StudyModel,
+    progress: Progress | None = None,
+    effects: Sequence[str | AbstractEffect] | str | None = None,
 ) -> LoopResult:
-    """Close the loop on data that are divided, and judge it by the runs held out.
+    """Close the loop as a study asks, and judge it by the runs held out: some, or each in turn.
 
-    `data`: runs to fit, and those held out: some, or each in turn. `declared`, `max_effects`,
-    `**options`: as in `run_loop`. `progress`: called with a line of text now and then, and about
-    what fraction is done.
+    `data`, `declared`: of the study. `progress`: called with a line of text now and then, and about
+    what fraction is done. `effects`: candidates in place of the study's.
     """
+    options: dict[str, Any] = dict(study.loop) | {"laws": declared.choice, "fit": data.fit.names}
+    options |= {} if effects is None else {"effects": effects}
+    model, tell = forward_model(declared), by_time(progress)
     rounds = 1 + len(data.fit) if data.each else 1
-    tell = by_time(progress)
     sheared = all(run.protocol.control == "rate" and run.flow == "shear" for run in data.fit.runs)
     held_out = data.each or bool(len(data.held_out))
-    left = SearchTime(max_effects, len(declared.modulus) > 1, rounds, held_out, sheared)
+    several = len(model.modulus) > 1
+    left = SearchTime(study.loop.max_effects, several, rounds, held_out, sheared)
     states = not any(run.protocol.control in ("rate", "stress") for run in data.fit.runs)
 
     def say(line: str) -> None:
         tell(line, left.heard(line), STATES if states else 0.0)
 
-    options |= {"fit": data.fit.names, "max_effects": max_effects, "progress": say}
     if data.each:
-        return run_loop_on_each(data.dataset, declared, **options)
-    return run_loop(data.dataset, declared, held_out=data.held_out.names, **options)
+        result = run_loop_on_each(data.dataset, model, progress=say, **options)
+    else:
+        held = data.held_out.names
+        result = run_loop(data.dataset, model, held_out=held, progress=say, **options)
+    result = titled(result, study, data)
+    return replace(result, described=_described(result, study, data, declared))
+
+
+def titled(result: LoopResult, study: Study, data: StudyData) -> LoopResult:
+    """Return a result with the title, the tolerance and the temperature of its study."""
+    title = data.dataset.name if study.path is None else study.name
+    at = temperature(study, data.dataset)
+    return replace(result, title=title, tolerance=study.verdict.tolerance, temperature_C=at)
+
+
+def _described(result: LoopResult, study: Study, data: StudyData, declared: StudyModel) -> str:
+    """Return the data and the declared model in words."""
+    dataset, window = data.dataset, study.loop.strain
+    strain = "" if window is None else f", strain {window[0]:g} to {window[1]:g}"
+    held_out = "each held out in turn" if data.each else f"{len(data.held_out)} held out"
+    known = ", ".join(effect.text for effect in declared.effects)
+    law = declared.described
+    if result.laws:
+        law = f"{result.laws[0].title}, chosen of {len(result.laws)} laws"
+    return (
+        f"Data: {dataset.name}, {counted(len(data.fit), 'run')} fitted, {held_out}{strain}"
+        f". Declared model: {law}, {declared.modes_in_words}"
+        f"{f'; known effects: {known}' if known else ''}. "
+        f"{f'{declared.source} ' if declared.source else ''}{dataset.left_out} {dataset.thinned}"
+    ).strip()
 
 
 def run_loop_on_each(

@@ -1,12 +1,13 @@
 """One run as a closed loop leaves it: measured, and predicted by every model on the way."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
+from discover.dataset.run import TEMPERATURE
 from discover.loop.parts import ErrorPair
 from discover.loop.runs import strain_of
 from discover.protocols.control import drawn_against
@@ -52,6 +53,25 @@ class RunRecord:
     def fastest(self) -> float:
         """Largest rate, in 1/s."""
         return float(np.max(np.abs(self.rate)))
+
+    @property
+    def temperature_C(self) -> float | None:
+        """Temperature of the measurement, in whole °C; None where unknown."""
+        told = (self.conditions.get(key) for key in TEMPERATURE)
+        at = next((one for one in told if one is not None), None)
+        return None if at is None else float(round(at))
+
+    @property
+    def shift(self) -> float:
+        """Time on the instrument's clock over `time`: a_T of a run that was shifted, else 1."""
+        end = len(self.time) - 1
+        shifted = self.time[end] != self.instrument_time[end]
+        return float(self.instrument_time[end] / self.time[end]) if shifted else 1.0
+
+    @property
+    def unshifted(self) -> "RunRecord":
+        """The run with times and rates as the instrument had them."""
+        return replace(self, time=self.instrument_time, rate=self.rate / self.shift)
 
     @property
     def is_transient(self) -> bool:

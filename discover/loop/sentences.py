@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from discover.answer.sentences import A_TRANSIENT, MUCH
+from discover.answer.sentences import A_TRANSIENT, MUCH, degrees, reduced_to
 from discover.loop.by_quantity import differing, measured
 from discover.loop.parts import Stage
+from discover.loop.run_record import RunRecord
 from discover.words import (
     FIGURE_SYMBOLS,
     effect_title,
     effects_title,
+    percent_of,
     significant,
 )
 
@@ -65,8 +65,7 @@ def doubted(result: Any) -> float | None:
 
 def what_to_measure_next(result: Any) -> str:
     """Return what would say most: more signal, a check of an effect, another test."""
-    rates = [float(np.max(np.abs(record.rate))) for record in result.records]
-    faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
+    faster = f"a shear rate above {_fastest(result.records)}"
     if result.verdict == "no_signal":
         return (
             "Check that the sensor is connected and the sample loaded; use a larger sample, a more "
@@ -91,6 +90,16 @@ def what_to_measure_next(result: Any) -> str:
         return f"To confirm {title}, {check}."
     others = several([*map(effect_title, doubtful.aliases)], "and")
     return f"To distinguish {title} from {others}, {check}."
+
+
+def _fastest(records: Sequence[RunRecord]) -> str:
+    """Return the rate of the fastest run as it was measured, with its temperature if shifted."""
+    if not records:
+        return "that of the fastest run"
+    fastest = max(records, key=lambda record: record.fastest)
+    at = fastest.temperature_C
+    place = "" if fastest.shift == 1.0 or at is None else f" and {degrees(at)}"
+    return f"{significant(fastest.unshifted.fastest, 2)} 1/s{place}"
 
 
 def _as_clause(check: str) -> str:
@@ -122,7 +131,7 @@ def _of_another_stress(result: Any) -> str:
         apart = differing(result, kind)
         if apart is None or not result.tolerance < apart <= MUCH or not shear:
             continue
-        rate = max(record.fastest for record in shear)
+        rate = max(record.unshifted.fastest for record in shear)
         stress = result.spread_of_laws[kind].stress
         if kind == "N1":
             in_reach = stress is None or stress >= _LEAST_NORMAL_STRESS
@@ -130,8 +139,8 @@ def _of_another_stress(result: Any) -> str:
             thick = stress is None or stress >= _LEAST_TENSILE_VISCOSITY * rate
             in_reach = thick and rate <= _FASTEST_EXTENSION
         if in_reach and measured(result.records, kind, None) is None:
-            fastest = significant(rate, 2)
-            return f"{title} at {fastest} 1/s."  # why: its row of the table
+            apart_by = f"equally good laws differ by {percent_of(apart)}"
+            return f"{title} at {_fastest(shear)}: {apart_by}."
     return ""
 
 
@@ -168,6 +177,8 @@ def _telling_test(result: Any) -> str:
     others = several([titles[j] for i, j in best.pairs if i == chosen], "and")
     what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
     title = f"{best.title[:1].upper()}{best.title[1:]}"
+    if any(record.shift != 1.0 for record in result.records):
+        title += f", reduced to {reduced_to(result)}"
     return f"{title}{what}: it should distinguish {titles[chosen]} from {others}."
 
 

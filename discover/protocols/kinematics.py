@@ -6,7 +6,7 @@ All of them share their principal third axis, so that the stress has four compon
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Literal, get_args
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -197,10 +197,3 @@ def in_words(quantities: Iterable[str]) -> str:
     """Return in words what is recorded, of several quantities."""
     found = set(quantities)
     return listed([words for quantity, words in _IN_WORDS.items() if quantity in found])
-
-
-FlowClass = Literal[
-    "laos", "start_up", "cessation", "steps", "superposed", "step_strain", "flow_curve", "creep",
-    "uniaxial", "planar", "biaxial",
-]  # fmt: skip
-FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)

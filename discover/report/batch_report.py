@@ -7,7 +7,6 @@ from typing import Any
 from discover.equations.spelling.markup import number, term_mathml
 from discover.learners.registry import learner_title
 from discover.report.page import render
-from discover.report.wording import RULES
 from discover.words import FIGURE_SYMBOLS, effect_title
 
 _COMPARED = ("sigma12", "N1", "N2")
@@ -20,7 +19,6 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
     `discover.batch.status.StudyRow`, in the same order.
     """
     learners = list(dict.fromkeys(name for row in rows for name in row.learners))
-    rules = list(dict.fromkeys(rule for row in rows for rule in row.chosen))
     pairs = list(zip(studies, rows, strict=True))
     return render(
         "batch.html",
@@ -38,16 +36,6 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
             }
             for study, row in pairs
             if row.learners
-        ],
-        rules=[RULES.get(rule, rule) for rule in rules],
-        selections=[
-            {
-                "study": study,
-                "cells": [_support(row.chosen.get(rule)) for rule in rules],
-                "agree": row.agree,
-            }
-            for study, row in pairs
-            if row.chosen
         ],
         loops=[
             {
@@ -91,17 +79,8 @@ def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
     return "<wbr/>".join(f"<math><mrow>{part}</mrow></math>" for part in parts) or "no term"
 
 
-def _support(terms: Sequence[str] | None) -> str:
-    if terms is None:
-        return "–"
-    return "<br>".join(f"<math>{_term(term)}</math>" for term in terms) or "no term"
-
-
-def _term(
-    name: str, inner: Mapping[str, float] | None = None, coefficient: float | None = None
-) -> str:
+def _term(name: str, inner: Mapping[str, float], coefficient: float) -> str:
     try:
         return term_mathml(name, inner, coefficient)
     except ValueError:  # a file that somebody edited
-        factor = "" if coefficient is None else number(coefficient)
-        return f"{factor}<mtext>{html.escape(name[:200])}</mtext>"
+        return f"{number(coefficient)}<mtext>{html.escape(name[:200])}</mtext>"

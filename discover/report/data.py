@@ -7,7 +7,6 @@ import numpy as np
 
 from discover.dataset.checking.runs import Finding
 from discover.dataset.dataset import Dataset
-from discover.dataset.linear.linear_tests import NAMES, SWEEP
 from discover.dataset.linear.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
@@ -113,16 +112,13 @@ _UNKNOWN = 0.3
 span a factor of four either way."""
 
 _SYMBOLS = {"C1": ("C1", ""), "C2_K": ("C2", "K"), "activation_energy_J_mol": ("E", "J/mol")}
-_PLURALS = {kind: f"{name}s" for kind, name in NAMES.items()} | {"relaxation": "relaxation moduli"}
 
 
 def superposition_words(found: Superposition) -> list[str]:
     """Return what can be said of a superposition, a sentence each."""
-    said = [_verdict(found, kind) for kind in found.leading]
+    said = [_verdict(found)]
     if found.verdict == "not_superposed":
         return said
-    led = [kind for kind in found.tests if kind not in found.leading]
-    said += [_verdict(found, kind) for kind in led if found.misfits(kind)]
     open_ = [
         f"{found.celsius[i]:g}" for i in np.flatnonzero(np.max(found.error, axis=1) > _UNKNOWN)
     ]
@@ -131,38 +127,29 @@ def superposition_words(found: Superposition) -> list[str]:
             f"At {', '.join(open_)} °C these data do not determine the shift factors: where the "
             "curves overlap they are straight lines, which slide along themselves."
         )
-    if found.apart:
-        degrees = ", ".join(f"{t:g}" for t in found.apart)
-        said.append(f"The tests at {degrees} °C are not moved: no test of their kind to compare.")
     return [*said, *(_law_words(law, found) for law in found.laws)]
 
 
-def _verdict(found: Superposition, kind: str) -> str:
-    misfits = found.misfits(kind)
-    if not misfits:  # shifts that nothing determines may leave no overlap
+def _verdict(found: Superposition) -> str:
+    if not found.misfits:  # shifts that nothing determines may leave no overlap
         return (
-            f"Whether the {_PLURALS[kind]} superpose is doubtful: moved by the shifts found, those "
-            "of neighbouring temperatures do not overlap."
+            "Whether the sweeps superpose is doubtful: moved by the shifts found, those of "
+            "neighbouring temperatures do not overlap."
         )
-    (cold, warm), size = max(misfits.items(), key=lambda item: item[1])
+    (cold, warm), size = max(found.misfits.items(), key=lambda item: item[1])
     worst, where = percent(size), f"{cold:g} and {warm:g} °C"
-    own = kind in found.leading
-    moved = "" if own else f" with the shifts of the {_PLURALS[found.leading[0]]}"
-    what = _PLURALS[kind]
-    verdict = found.verdict_of(kind)
-    if verdict == "superposed":
-        return f"The {what} superpose{moved}: the worst overlap, of {where}, is off by {worst}."
-    if verdict == "doubtful":
+    if found.verdict == "superposed":
+        return f"The sweeps superpose: the worst overlap, of {where}, is off by {worst}."
+    if found.verdict == "doubtful":
         return (
-            f"Whether the {what} superpose{moved} is doubtful: those at {where} are off by {worst} "
-            "where they overlap, more than two loadings of one sample usually are "
+            f"Whether the sweeps superpose is doubtful: those at {where} are off by {worst} where "
+            f"they overlap, more than two loadings of one sample usually are "
             f"({percent(SUPERPOSED)})."
         )
-    one = "sweep" if kind == SWEEP else "table"
     return (
-        f"The {what} do not superpose{moved}: those at {where} are off by {worst} where they "
-        f"overlap ({percent(FAILED)} or more). No single {one} stands for them; leave temperatures "
-        "out with --between, or allow a shift of the moduli with --vertical."
+        f"The sweeps do not superpose: those at {where} are off by {worst} where they overlap "
+        f"({percent(FAILED)} or more). No single sweep stands for them; leave temperatures out "
+        "with --between, or allow a shift of the moduli with --vertical."
     )
 
 
@@ -191,8 +178,7 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
 def superposition_page(found: Superposition, name: str) -> str:
     """Return the page."""
     pictures = attempt("The pictures", lambda: superposition_pictures(found))
-    kinds = [kind for kind in found.tests if found.misfits(kind)]
-    misfits = {kind: found.misfits(kind) for kind in kinds}
+    off = {cold: percent(misfit) for (cold, _), misfit in found.misfits.items()}
     return render(
         "superposition.html",
         name=name,
@@ -200,18 +186,14 @@ def superposition_page(found: Superposition, name: str) -> str:
         doubtful=found.verdict != "superposed",
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,
-        kinds=[_PLURALS[kind] for kind in kinds],
         lines=[
             {
                 "temperature": f"{degrees:g}",
                 "a": _table_factor(found, i, 0),
                 "b": _table_factor(found, i, 1),
-                "misfits": [
-                    next((percent(m) for (cold, _), m in pairs.items() if cold == degrees), "")
-                    for pairs in misfits.values()
-                ],
+                "misfit": off.get(degrees, ""),
             }
-            for i, degrees in enumerate(found.celsius)
+            for i, degrees in enumerate(found.celsius.tolist())
         ],
     )
 

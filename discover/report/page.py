@@ -16,8 +16,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup, escape
 
 from discover._version import __version__
-from discover.answer import Answer, Constant, ExpectedError, Suspect
+from discover.answer import Answer, Constant, Suspect
 from discover.answer.sentences import (
+    CLASSICAL,
     FEW_MODES,
     NOT_SEPARABLE,
     SUSPECTED,
@@ -26,11 +27,11 @@ from discover.answer.sentences import (
     degrees,
     error_title,
     expected,
-    further,
     in_order,
     is_a_set,
     law,
     linear_part,
+    note,
     quality,
     reduced_to,
     separable,
@@ -47,7 +48,16 @@ from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import percent, percent_range
-from discover.words import LEVEL, effect_title, estimate, interval, listed, readable, significant
+from discover.words import (
+    LEVEL,
+    effect_title,
+    estimate,
+    interval,
+    listed,
+    percent_of,
+    readable,
+    significant,
+)
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -182,6 +192,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if answer is None:
         return None
     found: dict[str, Any] = {
+        "title": (answer.title or answer.instead.lower()).partition(":")[0],
         "headline": _unbroken(law(answer)),
         "quality": _unbroken(quality(answer)),
         "level": LEVEL,
@@ -191,13 +202,12 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "expected": (), "modes": (), "linear": "", "few": 0, "solvent": "", "set": False,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
-        "lines": list(map(_unbroken, further(answer))),
+        "behind": _unbroken(answer.alternative),
         "next_test": _unbroken(answer.next_test),
     }  # fmt: skip
     if not answer.title:
         return found
     solvent = answer.solvent_viscosity_Pa_s
-    rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
     symbols = [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
         # terms as the equation in Pa and s has them: over the stress of a mode in units of G
@@ -223,7 +233,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "set": is_a_set(answer),
         "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
         "suspected": SUSPECTED.lower() + _clock(answer),
-        "expected": _expected(rows) + _worst(answer),
+        "expected": _expected(answer) + _worst(answer),
         "modes": [
             tuple(as_constant(answer, one) for one in (mode.modulus_Pa, mode.relaxation_time_s))
             for mode in in_order(answer)
@@ -243,21 +253,24 @@ def _clock(answer: Answer) -> str:
 
 
 def _said(one: Constant) -> str:
-    """Return what a constant is, and that its value is at an end of what is physical."""
-    return "; ".join(filter(None, [one.said, "at its physical limit" if one.at_limit else ""]))
+    """Return what a constant is, and that its value is at an end of what is possible."""
+    skewed = "at an end of its interval" if one.is_skewed or one.bound else ""
+    at_end = "at its physical limit" if one.at_limit else skewed
+    return "; ".join(filter(None, [one.said, at_end]))
 
 
-def _expected(rows: Sequence[tuple[str, ExpectedError]]) -> list[dict[str, Any]]:
+def _expected(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of expected errors; quantities that nothing is known of share one."""
     found: list[dict[str, Any]] = []
-    for symbol, one in rows:
+    for name, symbol in SYMBOLS.items():
+        one = answer.expected(name)
         row = {
             "symbol": symbol,
             "inside": _in_cell(expected(one, "inside")),
             "beyond": _in_cell(expected(one, "beyond")),
             "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
             "known": one.is_known,
-            "note": _unbroken(one.note),
+            "note": _unbroken(note(answer, name)),
         }
         if found and not one.is_known and found[-1] == row | {"symbol": found[-1]["symbol"]}:
             found[-1]["symbol"] += f", {symbol}"
@@ -267,13 +280,16 @@ def _expected(rows: Sequence[tuple[str, ExpectedError]]) -> list[dict[str, Any]]
 
 
 def _worst(answer: Answer) -> list[dict[str, Any]]:
-    """Return the row of the run that is missed most, if by more than the tolerance."""
-    worst = worst_run(answer)
-    if worst is None:
-        return []
-    note, error = worst
-    return [{"symbol": "worst run", "inside": _in_cell(error), "beyond": "", "beyond_at": "",
-             "known": True, "note": note}]  # fmt: skip
+    """Return the rows of the run that is missed most, if it is, and of the best classical law."""
+    told = [] if (worst := worst_run(answer)) is None else [("worst run", *worst)]
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        told.append((CLASSICAL.lower(), near, percent_of(error)))
+    return [
+        {"symbol": symbol, "note": _unbroken(note), "inside": _in_cell(error), "beyond": "",
+         "beyond_at": "", "known": True}
+        for symbol, note, error in told
+    ]  # fmt: skip
 
 
 def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
@@ -299,7 +315,7 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
 
 
 _TOGETHER = re.compile(
-    r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/)|(?<=Pa) (?=s)"
+    r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/|°C)|(?<=Pa) (?=s)"
     r"|(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=×|1/|Pa|s\b|%)|(?<=×) |(?<=% CI) |(?<=%) (?=CI\b)|(?<=\() "
 )
 
@@ -339,7 +355,12 @@ def _explained(text: str) -> Markup:
 
 
 def _in_cell(text: str) -> str:
-    """Return a number that breaks between a power of ten and its unit, or an interval before it."""
+    """Return a number that breaks between a power of ten and its unit, or an interval before it.
+
+    Words without a number break anywhere.
+    """
+    if not any(map(str.isdigit, text)):
+        return text
     whole = _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace(")\N{NO-BREAK SPACE}", ") ")
     return re.sub("(×\N{NO-BREAK SPACE}10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)\N{NO-BREAK SPACE}", r"\1 ", whole)
 

@@ -1,6 +1,6 @@
 """``predictions.csv``: every curve that a report draws, one line a sample."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,6 @@ import pandas as pd
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.loop import LoopResult, RunRecord
-from discover.report.overlay import Overlay
 from discover.study.run_folder import RunFolder
 
 COLUMNS = (
@@ -36,9 +35,7 @@ _ROLES["high_deborah"] = "prediction"
 _SOURCES = {"before": "declared"}
 
 
-def comparison_predictions(
-    comparison: Comparison, overlays: Sequence[Overlay] = ()
-) -> pd.DataFrame:
+def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
     """Return the curves of a comparison: declared law, learners and posterior, in every flow.
 
     Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` are the 95 % band of the
@@ -46,13 +43,11 @@ def comparison_predictions(
     where nothing was.
     A law that cannot be integrated through a flow has no line there.
 
-    `comparison`: flows over which only errors are mapped are left out. `overlays`: curves that the
-    study asks for; their sources are their labels.
+    `comparison`: flows over which only errors are mapped are left out.
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}
     curves[POSTERIOR] = {key: band.middle for key, band in comparison.bands.items()}
-    curves |= {overlay.label: overlay.curves for overlay in overlays}
     parts = []
     for flow in comparison.flows:
         if flow.kind not in _ROLES:
@@ -84,14 +79,14 @@ def comparison_predictions(
     return _table(parts)
 
 
-def loop_predictions(result: LoopResult, overlays: Sequence[Overlay] = ()) -> pd.DataFrame:
+def loop_predictions(result: LoopResult) -> pd.DataFrame:
     """Return the curves of a closed loop, by the declared model and by the augmented one.
 
     Units as in `comparison_predictions`. Where nothing was added there is only the declared model.
     The limits hold where 95 % of the measurements should lie by all explanations together; they
     stand with the model that was found.
     """
-    return _table([part for r in result.records for part in _record_parts(r, overlays)])
+    return _table([part for r in result.records for part in _record_parts(r)])
 
 
 def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
@@ -102,13 +97,11 @@ def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
     return text
 
 
-def _record_parts(record: RunRecord, overlays: Sequence[Overlay]) -> Iterator[pd.DataFrame]:
+def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
     sources = {"declared": record.predicted[0]}
     if len(record.predicted) > 1:
         sources["augmented"] = record.predicted[-1]
     found = [*sources][-1]
-    curves = {overlay.label: overlay.of(record.name, record.quantity) for overlay in overlays}
-    sources |= {label: curve for label, curve in curves.items() if curve is not None}
     for source, predicted in sources.items():
         band = record.band if source == found else None
         low, high = (np.nan, np.nan) if band is None else band

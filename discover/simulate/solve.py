@@ -10,10 +10,17 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.forward.flows import make_batch
 from discover.forward.grid import MAX_GRID_POINTS, STRAIN_STEP, had_gone_on
-from discover.forward.of_fluids import bare_run, components, followed, observed_in
+from discover.forward.of_fluids import (
+    bare_run,
+    components,
+    followed,
+    observed_in,
+    of_solvent,
+    recorded_and_normal,
+)
 from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import FOLLOWED
-from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates
+from discover.protocols.protocol import FlowProtocol, shear_rates
 
 # Of the finest grid: the most of a grid that is made, halved once. A step takes some 3 µs
 MAX_STEPS = 2 * MAX_GRID_POINTS
@@ -21,9 +28,6 @@ MAX_STEPS = 2 * MAX_GRID_POINTS
 # What is left of the error when all steps are halved, by a method of fourth order, of which less
 # is counted on
 _HALVED = 1.0 / 8.0
-
-# σ11, σ22, σ33 and σ12 of the rate of deformation, over L11, L22, L33 and L12
-_OF_RATE = np.array([2.0, 2.0, 2.0, 1.0])
 
 
 class SimulationError(RuntimeError):
@@ -91,11 +95,8 @@ def simulate(
             f"{protocol.control!r}. A learned law's predict() and compare() take runs of any "
             "control."
         )
-    gradient = np.array([0.0, 0.0, 0.0, 1.0])
-    if protocol.kinematics is not None:
-        gradient = np.asarray(protocol.kinematics.gradient)
     rates = shear_rates(protocol, times)
-    viscous = float(fluid.solvent_viscosity) * rates[:, None] * gradient * _OF_RATE
+    viscous = of_solvent(fluid, protocol, rates)
     if float(times[-1]) == float(protocol.begins):
         return ShearStress(times, viscous)
     run = followed(fluid, bare_run(protocol, times))
@@ -149,10 +150,7 @@ def observe(
     At a given rate to a tolerance, as `simulate` does.
     """
     if protocol.control in FOLLOWED:
-        stress = simulate(fluid, protocol, times)
-        recorded = recorded_at(protocol, stress.components)
-        n1, n2 = stress.first_normal_stress_difference, stress.second_normal_stress_difference
-        return np.stack([recorded, n1, n2], axis=-1)
+        return recorded_and_normal(protocol, simulate(fluid, protocol, times).components)
     found = observed_in(fluid, protocol, times)
     if not np.all(np.isfinite(found)):
         what = "bears this stress" if protocol.control == "stress" else "becomes periodic"

@@ -6,7 +6,7 @@ import secrets
 import socket
 import stat
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from discover.errors import InputError
@@ -82,6 +82,16 @@ def require_ours(folder: Path, names: Sequence[str], mark: str) -> None:
         raise InputError(
             f"{folder} holds a {there} that is not a result of this command. Use --overwrite to "
             "replace it, or another --out."
+        )
+
+
+def require_free(folder: Path, names: Iterable[str], overwrite: bool) -> None:
+    """Refuse a folder that holds a file of one of these names, unless it is to be replaced."""
+    there = next((name for name in names if os.path.lexists(folder / name)), None)
+    if there is not None and not overwrite:
+        raise InputError(
+            f"{folder} holds a {there} already. Use --overwrite to replace the files of the same "
+            "names, or another --out."
         )
 
 

@@ -202,7 +202,4 @@ def fingerprint(study: Study, *extra: object) -> str:
     if study.model.from_ is not None:
         earlier = result_file(study.model.from_, study.path)
         digest.update(read_bytes(earlier, earlier.name))
-    for asked in study.report.overlay:
-        if asked.file is not None:
-            digest.update(read_bytes((_base(study) or Path()) / asked.file, asked.file))
     return digest.hexdigest()[:16]

@@ -1,7 +1,8 @@
 """From a study to its declared fluid."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from discover.dataset.run import SLOWEST_RATE, Run
 from discover.effects import ConstitutiveEffect, KnownEffect, known_effects
 from discover.equations import AugmentedLaw, Equation
 from discover.errors import InputError
-from discover.forward import DeclaredModel as ForwardDeclared
+from discover.forward import DeclaredModel
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import law_of_each_mode
 from discover.laws.multimode import Fluid
@@ -32,7 +33,7 @@ MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 
 
 @dataclass(frozen=True)
-class DeclaredModel:
+class StudyModel:
     """The declared law with starting values for what is to be fitted."""
 
     law: AbstractConstitutiveLaw  # the dimensionless law
@@ -90,7 +91,7 @@ class DeclaredModel:
         return Fluid(self.law, self.modulus, self.relaxation_time, self.solvent_viscosity)
 
 
-def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
+def declared_model(study: Study, dataset: Dataset) -> StudyModel:
     """Return the declared law of a study, with its modes; InputError if something is wrong."""
     model = study.model
     effects = known_effects(model.effects, "[model] effects")
@@ -142,10 +143,10 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     modes = modulus, relaxation_time, tuple(free), spectrum, float(solvent or 0.0)
     also = {"by_mode": model.by_mode, "choice": model.choice, "solid": solid}
-    return DeclaredModel(law, name, parameters, *modes, effects, **also)
+    return StudyModel(law, name, parameters, *modes, effects, **also)
 
 
-def forward_model(declared: DeclaredModel) -> ForwardDeclared:
+def forward_model(declared: StudyModel) -> DeclaredModel:
     """Return a study's declared model as forward models take it, with all that is to be fitted."""
     spectrum = declared.spectrum
     modes = declared.modulus, declared.relaxation_time
@@ -159,8 +160,8 @@ def forward_model(declared: DeclaredModel) -> ForwardDeclared:
     }
     if declared.law.linear_relaxation and declared.law_name in LAWS:
         named = declared.law_name, declared.parameters
-        return ForwardDeclared.named(*named, *modes, free=declared.free, **options)
-    return ForwardDeclared(
+        return DeclaredModel.named(*named, *modes, free=declared.free, **options)
+    return DeclaredModel(
         declared.law, *modes, fit_modulus="modulus_Pa" in declared.free,
         fit_relaxation_time="relaxation_time_s" in declared.free, **options,
     )  # fmt: skip
@@ -193,7 +194,7 @@ FOUND_LAW = "a law found before"
 
 def _from_earlier(
     found: EarlierResult, own: Sequence[KnownEffect], spectrum: RelaxationSpectrum | None
-) -> DeclaredModel:
+) -> StudyModel:
     """Return what a result found as declared; effects of the study stand in place of its own."""
     equation = found.equation
     names = {known.name for known in own}
@@ -210,7 +211,7 @@ def _from_earlier(
             name, constants = equation.named.law, dict(equation.named.constants[0])
     modes = np.array(equation.modulus), np.array(equation.relaxation_time)
     rest = spectrum, equation.solvent_viscosity, (*kept, *own), found.told(names)
-    return DeclaredModel(law, name, constants, *modes, (), *rest)
+    return StudyModel(law, name, constants, *modes, (), *rest)
 
 
 def _law_of_each_mode(
@@ -249,19 +250,21 @@ def _spectrum_of(
     times = np.array(found.equation.relaxation_time)
     if dataset.linear_sweep is None:
         return None
-    solvent = found.equation.solvent_viscosity
-    # of the sweep alone, beside a solvent that was declared, and with a number of modes given
-    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
-    for options in asked:
-        try:
-            spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window), **options)
-        except InputError:
-            return None  # a sweep too short for modes, which were given as numbers then
+    sweep = _usable(dataset.linear_sweep, window)
+    for spectrum in spectra_of(sweep, found.equation.solvent_viscosity, len(times)):
         if spectrum.relaxation_time.shape == times.shape:
             factor = times / spectrum.relaxation_time
             if np.ptp(factor) <= _SAME_MODES * np.max(factor):
                 return spectrum
     return None
+
+
+def spectra_of(sweep: LinearSweep, solvent: float, modes: int) -> Iterator[RelaxationSpectrum]:
+    """Yield those of a sweep alone, beside a solvent in Pa s, and of a number of modes."""
+    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": modes})
+    for options in asked:
+        with suppress(InputError):  # too short a sweep, of which the modes are not then
+            yield relaxation_spectrum(sweep, **options)
 
 
 def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:

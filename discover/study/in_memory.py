@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from discover.dataset import Dataset, Run
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
@@ -16,8 +16,9 @@ from discover.laws.each_mode import differs_by_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.data import StudyData
-from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+from discover.study.data import StudyData, parse_study
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, spectra_of
+from discover.study.schema import Study
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only tests: a data set of its own, or names of runs of the data set."""
@@ -69,7 +70,7 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
     return Dataset(data.name, runs, data.linear_sweep, data.provenance)
 
 
-def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
+def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     """Return a `Fluid` as the declared model of a study; None is Maxwell with G = 1 Pa, λ = 1 s.
 
     Where the modes are those of the data's linear sweep, the error of the sweep is known.
@@ -90,15 +91,29 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     name, parameters = name_of(base.law) or (own, {})
     modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)
-    return DeclaredModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
+    return StudyModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
+
+
+def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
+    """Return the study that would ask for the same with files.
+
+    `asked`: sections of it besides ``[data]``. `where`: the call, as an error names it.
+    """
+    source: dict[str, Any] = {"folder": data.name or "data in memory"}
+    if isinstance(data, SyntheticDataset) and data.truth is not None:
+        found = name_of(data.truth.law)
+        if found is not None:
+            made = {"law": found[0], "parameters": found[1], "noise": data.noise}
+            source = {"synthetic": made}
+    return parse_study({"data": source, **asked}, where)
 
 
 def with_known(
-    declared: DeclaredModel,
+    declared: StudyModel,
     effects: Mapping[str, Any] | None,
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
-) -> DeclaredModel:
+) -> StudyModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
     `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
@@ -122,14 +137,8 @@ def _spectrum(data: Dataset, base: Fluid) -> RelaxationSpectrum | None:
     """Return the spectrum of the data's linear sweep if the modes are those."""
     if data.linear_sweep is None:
         return None
-    solvent, modes = float(base.solvent_viscosity), base.n_modes
     modulus, time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
-    known: dict[str, Any] = {"solvent_viscosity": solvent}
-    for options in ({}, known, {"modes": modes}):
-        try:
-            found = relaxation_spectrum(data.linear_sweep, **options)
-        except InputError:
-            continue
+    for found in spectra_of(data.linear_sweep, float(base.solvent_viscosity), base.n_modes):
         if np.array_equal(found.modulus, modulus) and np.array_equal(found.relaxation_time, time):
             return found
     return None

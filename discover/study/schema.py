@@ -1,31 +1,71 @@
 """The study file: what may be written in it, and nothing else."""
 
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
 from discover.answer import TOLERANCE
 from discover.dataset.linear_viscoelasticity import MOST_MODES
 from discover.dataset.run import LARGEST
 from discover.effects.registry import known_effects
 from discover.errors import Problems
-from discover.laws.registry import ANY, LAWS
+from discover.laws.registry import ANY, LAWS, make_law, starting_value
 from discover.learners.registry import learner_names
 from discover.learners.settings import DEFAULT_DEGREE
-from discover.protocols.kinematics import FLOW_CLASSES, FlowClass
-from discover.study.key_values import (
-    ByHand,
-    ClosedFormName,
-    LawNames,
-    LearnerName,
-    NotNegative,
-    Positive,
-    Seed,
-    SyntheticLaw,
-    require_parameters,
-)
 from discover.validation import Section
+from discover.words import unknown_name
+from tensor_library.closed_forms import CLOSED_FORMS
+
+
+def _one_of(kind: str, known: Callable[[], Iterable[str]]) -> Callable[[str], str]:
+    def check(name: str) -> str:
+        if name not in known():
+            raise ValueError(unknown_name(kind, name, known()))
+        return name
+
+    return check
+
+
+_known_law = _one_of("law", lambda: LAWS)
+
+
+def _known_law_or_several(given: Any) -> Any:
+    if isinstance(given, list | tuple):
+        if len(set(given)) < 2:
+            raise ValueError("law as a list names two laws or more to choose from, each once")
+        return tuple(_known_law(str(name)) for name in given)
+    return given if given in (ANY, "learned") else _known_law(str(given))
+
+
+ClosedFormName = Annotated[str, AfterValidator(_one_of("closed form", lambda: CLOSED_FORMS))]
+LearnerName = Annotated[str, AfterValidator(_one_of("learner", learner_names))]
+SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
+LawNames = Annotated[str | tuple[str, ...], BeforeValidator(_known_law_or_several)]
+Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
+# wider than any instrument, and narrow enough that squares and ratios compute
+_LEAST, _MOST = 1e-15, 1e15
+
+
+def _not_tiny(value: float) -> float:
+    if value < _LEAST:
+        raise ValueError(f"should be at least {_LEAST:g}; got {value:g}")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0, le=_MOST), AfterValidator(_not_tiny)]
+
+
+NotNegative = Annotated[float, Field(ge=0, le=_MOST)]
+ByHand = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_MODES)]
+"""A constant of each relaxation mode."""
+
+
+def require_parameters(law: str, parameters: Mapping[str, Any]) -> None:
+    """Refuse parameters that a law has not, or that lie outside their ranges."""
+    values = {k: starting_value(law, k) if v == "fit" else v for k, v in parameters.items()}
+    make_law(law, values)
 
 
 class Library(Section):
@@ -37,39 +77,18 @@ class Library(Section):
     """Closed forms besides, such as `"exp"`."""
 
 
-class Sweep(Section):
-    """The same comparison again over laws and values of one parameter, as synthetic data.
-
-    The paper's study of linear and exponential PTT over the extensibility is one.
-    """
-
-    laws: Annotated[tuple[SyntheticLaw, ...], Field(min_length=1)]
-    """Laws that make the data."""
-    parameter: str
-    """Parameter that is varied."""
-    values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
-    """Its values."""
-
-
-Stress = Literal["sigma12", "N1", "N2"]
 Recorded = Literal[
     "sigma12", "tensile_stress", "N1", "N2", "strain", "storage_modulus", "loss_modulus"
 ]
 
 
 class NextExperiment(Section):
-    """What the user could measure next."""
+    """Oscillations that could be measured: errors in them are mapped where the truth is known."""
 
-    flows: Annotated[tuple[FlowClass, ...], Field(min_length=1)] = FLOW_CLASSES
-    """Classes of flow that could be measured."""
-    observe: Annotated[tuple[Stress, ...], Field(min_length=1)] = ("sigma12", "N1", "N2")
-    """What could be recorded."""
     weissenberg_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.5, 1.0, 2.0, 4.0)
     """Weissenberg numbers that could be reached."""
     deborah_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.25, 0.5, 1.0, 2.0)
     """Deborah numbers that could be reached."""
-    noise: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Relative noise of the next experiment."""
 
 
 class Compare(Section):
@@ -101,12 +120,8 @@ class Compare(Section):
     """Whether measured N1 and N2 are fitted too."""
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
     """Deborah numbers of the Lissajous figures."""
-    sweep: Sweep | None = None
-    """The same comparison over a parameter of synthetic data."""
-    distillation: bool = False
-    """Whether simpler laws are taught by the true one."""
     next: NextExperiment = NextExperiment()
-    """What could be measured next."""
+    """Oscillations over which errors are mapped where the truth is known."""
     laws: tuple[SyntheticLaw, ...] = ()
     """Named laws that are fitted to the same runs."""
     loading: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
@@ -323,50 +338,6 @@ class Loop(Section):
         return self
 
 
-Modes = Positive | Annotated[tuple[Positive, ...], Field(min_length=1)] | None
-"""One number, or one for each mode."""
-
-
-def _count(modes: Modes) -> int:
-    return len(modes) if isinstance(modes, tuple) else int(modes is not None)
-
-
-class OverlayAsked(Section):
-    """A curve that the user wants beside the others: a law, or what a file holds."""
-
-    label: Annotated[str, Field(max_length=60)] = ""
-    """Name of the curve."""
-    law: SyntheticLaw | None = None
-    """Law that is drawn."""
-    parameters: dict[str, float] = Field(default_factory=dict)
-    """Its parameters."""
-    modulus_Pa: Modes = None
-    """Its modulus in Pa, or one of each mode; the declared ones where left out."""
-    relaxation_time_s: Modes = None
-    """Its relaxation time in s, or one of each mode."""
-    file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
-    """File with the columns of `predictions.csv`, in place of a law."""
-
-    @model_validator(mode="after")
-    def _one_kind(self):
-        if (self.law is None) == (self.file is None):
-            raise ValueError('an overlay has either law = "..." or file = "...", not both or none')
-        if self.file is not None and (self.parameters or self.modulus_Pa or self.relaxation_time_s):
-            raise ValueError("parameters and modes belong to a law, and this overlay is a file")
-        if _count(self.modulus_Pa) != _count(self.relaxation_time_s):
-            raise ValueError("modulus_Pa and relaxation_time_s go together, with as many values")
-        if self.label in ("declared", "augmented", *learner_names()):
-            raise ValueError(f"the label {self.label!r} names a curve of the report itself")
-        return self
-
-
-class Report(Section):
-    """What the page shows beside the results."""
-
-    overlay: Annotated[tuple[OverlayAsked, ...], Field(max_length=4)] = ()
-    """Curves drawn with those of the report."""
-
-
 class Verdict(Section):
     """Size of the discrepancy that the user accepts."""
 
@@ -385,8 +356,6 @@ class Study(Section):
     """How far `discover close-loop` goes."""
     compare: Compare = Compare()
     """What `discover compare` runs."""
-    report: Report = Report()
-    """What the page shows besides."""
     verdict: Verdict = Verdict()
     """What is accepted."""
     _path: Path | None = PrivateAttr(default=None)

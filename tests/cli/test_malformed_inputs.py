@@ -146,18 +146,3 @@ def test_a_study_with_the_name_of_a_file_of_the_batch_gets_a_folder_of_another()
     assert folder_names(paths) == ["study-batch.json", "study-Index.HTML", "table"]
     with pytest.raises(InputError):
         folder_names([Path("batch.json.toml"), Path("study-batch.json.toml")])
-
-
-def test_what_would_fail_after_the_training_is_refused_before(tmp_path):
-    for section in (
-        "distillation = true",
-        'sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1, -5.0] }',
-    ):
-        synthetic = "sweep" in section
-        harm.write_files(tmp_path, harm.SANE["FOLDER"])
-        data = 'synthetic = { law = "ucm", samples = 11 }' if synthetic else 'folder = "."'
-        (tmp_path / "s.toml").write_text(f"[data]\n{data}\n[compare]\n{section}\n")
-        outcome = malformed.run_call(
-            ["compare", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--overwrite"]
-        )
-        assert outcome.code == 2, outcome

@@ -7,7 +7,6 @@ import pytest
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
-from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study import parse_study
@@ -79,17 +78,3 @@ def test_an_outcome_comes_back_from_its_state_unchanged():
     assert again.predictions["test/b"] is None
     for quantity, values in wave.items():
         np.testing.assert_array_equal(again.predictions["test/a"][quantity], values)
-
-
-def test_a_sweep_has_no_instrument():
-    sweep = {"laws": ["ptt_linear"], "parameter": "epsilon", "values": [0.1]}
-    content = fake_study(sweep=sweep).model_dump(exclude_none=True, by_alias=True)
-    content["model"] = {"effects": {"stress_gain": {"gain_error": 0.1}}}
-    with pytest.raises(InputError, match="sweep computes data that hold no instrument"):
-        compare(parse_study(content))
-
-
-def test_a_sweep_over_an_unknown_parameter_is_refused():
-    sweep = {"laws": ["ptt_linear"], "parameter": "alpha", "values": [0.1]}
-    with pytest.raises(InputError, match="'alpha'"):
-        compare(fake_study(sweep=sweep))

@@ -1,5 +1,7 @@
 """Creep, recovery, amplitude sweeps and flow curves in learners and comparisons: by scipy."""
 
+from typing import cast
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,12 +11,13 @@ from independent import Giesekus, Modes, PhanThienTanner, start_up
 from independent.sweeps import modulus_of, strain_at
 
 import discover as dc
-from discover.comparison.records import corrected
+from discover.comparison.known_part import without_instrument
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
+from discover.loop.from_posterior import Ended
 from discover.protocols import imposed_stress, oscillations, steady_rates
 from discover.report.predictions import comparison_predictions
 from discover.study.data import StudyData
@@ -235,4 +238,4 @@ def test_an_instrument_is_not_taken_out_of_creep():
     data = dc.Dataset("planted", (creep(GIESEKUS, 40.0),))
     effects = known_effects({"stress_gain": {"gain_error": 0.1}})
     with pytest.raises(InputError, match=r"takes effects of an instrument \(stress_gain\)"):
-        corrected(StudyData(data, data, data.select([])), effects)
+        without_instrument(StudyData(data, data, data.select([])), cast(Ended, None), effects)

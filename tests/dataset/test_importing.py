@@ -318,3 +318,16 @@ def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data,
         np.testing.assert_allclose(
             getattr(again.linear_sweep, name), getattr(sweep, name), rtol=EXACT
         )
+
+
+def test_a_folder_of_files_is_imported_as_all_of_them(tmp_path):
+    (tmp_path / "mine").mkdir()
+    for name in ("slow.csv", "fast.csv"):
+        rows = "\n".join(f"{t:g},{RATE:g},{x:g}" for t, x in zip(TIMES, STRESS, strict=True))
+        (tmp_path / "mine" / name).write_text(f"time_s,shear_rate_1_s,stress_Pa\n{rows}\n")
+    (tmp_path / "mine" / ".hidden.csv").write_text("")
+    refused = CliRunner().invoke(app, ["data", "check", str(tmp_path / "mine")])
+    assert "discover data import" in refused.output  # which is what to do with it
+    done = invoke(tmp_path / "mine", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert {run.name for run in load_dataset(tmp_path / "out")} == {"slow.csv", "fast.csv"}

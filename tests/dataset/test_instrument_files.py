@@ -196,22 +196,12 @@ def test_a_shear_file_of_reptate_without_its_rate_is_refused(tmp_path):
     assert "Write gdot=" in result.stderr
 
 
-@pytest.mark.parametrize("with_rate", [False, True])
-def test_tables_of_mitlaos_and_spp_need_no_names(tmp_path, with_rate):
-    time = np.arange(400) * 0.02
-    strain, stress = 2 * np.sin(3 * time), 40 * np.sin(3 * time + 0.4) + 5 * np.sin(9 * time + 1)
-    rate = [6 * np.cos(3 * time)] if with_rate else []
-    out, result = imported(tmp_path, "a.txt", lines(time, strain, *rate, stress, mark="  "))
-    (test,) = load_dataset(out)
-    assert test.metadata["start"] == "periodic"
-    np.testing.assert_allclose(test.strain, strain, atol=1e-14)
-    np.testing.assert_allclose(test.stress, stress, rtol=EXACT)
-    assert "without names" in result.stdout
-
-
-def test_a_table_without_names_that_is_no_oscillation_is_refused(tmp_path):
-    _, result = imported(tmp_path, "a.txt", lines(TIMES, TIMES, TIMES), code=2)
+def test_a_table_without_names_is_refused_and_read_once_it_has_them(tmp_path):
+    record = lines(TIMES, 2.0 * TIMES, -np.expm1(-TIMES), mark="  ")
+    _, result = imported(tmp_path, "a.txt", record, code=2)
     assert "add a line such as time_s" in result.stderr
+    out, _ = imported(tmp_path, "b.txt", ["time_s strain stress_Pa", *record])
+    np.testing.assert_allclose(load_dataset(out)["b.csv"].strain, 2.0 * TIMES, rtol=EXACT)
 
 
 @pytest.mark.measured

@@ -106,6 +106,15 @@ def test_titles_name_what_the_table_names_and_nothing_else(rows, words):
     assert material_and_temperature([titled(**row) for row in rows]) == words
 
 
+@pytest.mark.parametrize(
+    ("samples", "words"),
+    [((), "melt-7, 20 °C"), (("LDPE",), "LDPE, 20 °C"), (("a1", "a2", "a3"), "melt-7, 20 °C")],
+)
+def test_the_name_of_the_data_stands_for_materials_that_nobody_told(samples, words):
+    runs = [titled(sample=one) for one in samples] + [titled(temperature_C=20.0)]
+    assert material_and_temperature(runs, otherwise="melt-7") == words
+
+
 def make_run(**changes):
     time = np.array([0.0, 1.0, 2.0])
     known = {"time": time, "protocol": start_up(1.0), "rate": np.ones(3), "stress": time}

@@ -49,8 +49,12 @@ def after(request, tmp_path_factory):
         patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
         patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, **network))
         patch.setattr(dc, "close_loop", partial(in_memory.close_loop, **loop))
-        few = partial(in_memory.run_loop_on, effects=["giesekus_mobility", "stress_gain"])
-        patch.setattr(in_memory, "run_loop_on", few)
+        run_study = in_memory.run_study
+
+        def with_few(study, data, declared, progress, _):
+            return run_study(study, data, declared, progress, ["giesekus_mobility", "stress_gain"])
+
+        patch.setattr(in_memory, "run_study", with_few)
         few_candidates(patch, ("giesekus_mobility", "ptt_linear", "stress_gain"))
         left: dict = {"folder": folder, "said": said, "is_drawn": request.param}
         exec(compile(script(), "docs/python.md", "exec"), left)

@@ -15,7 +15,6 @@ import discover as dc
 from discover import linear_algebra_threads
 from discover.accelerators import use_the_processor_from_the_start
 from discover.comparison import run_comparison
-from discover.learners import distillation
 from discover.learners.run_prediction import RunPrediction
 from discover.linear_algebra_threads import in_one_thread, use_one_thread_from_the_start
 from discover.loop import loop
@@ -249,9 +248,7 @@ def test_a_fit_runs_in_one_thread(monkeypatch):
     assert seen == [{1}]
 
 
-@pytest.mark.parametrize(
-    "function", [loop.run_loop, run_comparison.compare, distillation.distil, RunPrediction.fit]
-)
+@pytest.mark.parametrize("function", [loop.run_loop, run_comparison.compare, RunPrediction.fit])
 def test_what_fits_many_times_is_limited(function):
     assert hasattr(function, "__wrapped__")
 

@@ -14,7 +14,7 @@ def test_the_law_of_the_page_is_listed_fitted_reported_and_exported(workplace):
     listed = json.loads(workplace.run("laws", "--json").stdout)
     (mine,) = [law for law in listed if law["name"] == "quadratic_ptt"]
     assert mine["title"] == "quadratic PTT"
-    assert mine["parameters"]["k"]["high"] == 10.0
+    assert (mine["parameter"], mine["high"]) == ("k", 10.0)
 
     study = workplace.study(LAW, more='[loop]\neffects = ["giesekus_mobility"]\n')
     workplace.run("close-loop", study, "--out", "out", "--quiet")

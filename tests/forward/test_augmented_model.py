@@ -83,8 +83,8 @@ def least_squares_at(model, batch, start, at):
 
     low, high = model.low[list(at)], model.high[list(at)]
     found = least_squares(
-        lambda values: model.residuals(placed(values)[None], batch).ravel(), start[list(at)],
-        bounds=(low, high), x_scale="jac",
+        lambda values: batch.records.residual(model.predict(placed(values), batch)).ravel(),
+        start[list(at)], bounds=(low, high), x_scale="jac",
     )  # fmt: skip
     return placed(found.x)
 

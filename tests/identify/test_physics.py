@@ -9,7 +9,7 @@ import pytest
 from discover.identify.physics import check_physics, see
 from discover.identify.physics_flows import SHEAR, UNIAXIAL, steady_branch
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
-from discover.protocols import oscillatory_shear
+from discover.protocols import imposed_stress, in_flow, oscillatory_shear, start_up
 from tensor_library import TermLibrary, parse_term
 
 FLOWS = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}
@@ -76,6 +76,25 @@ def test_giesekus_is_monotonic_up_to_a_mobility_of_one_half(mobility, monotonic)
     checks = report(Giesekus(mobility))
     assert checks[FLOW_CURVE].passed is monotonic
     assert checks[EXTENSION].passed
+
+
+def test_in_extension_the_dissipation_is_that_of_extension():
+    times = np.array([40.0, 50.0])
+    seen = see(Fluid(), [in_flow(start_up(0.2), "uniaxial")], [times], 2.0, 1.0)
+    # A = diag(1/(1 − 2ε̇), 1/(1 + ε̇), 1/(1 + ε̇)), and tr(A + A⁻¹ − 2I)/2 is lost; what is left of
+    # the start is exp(−24), and steps err by 1e-6
+    lost = 0.5 * sum(a + 1.0 / a - 2.0 for a in (1.0 / 0.6, 1.0 / 1.2, 1.0 / 1.2))
+    assert seen.along.dissipation[0] == pytest.approx(lost, rel=1e-5)
+
+
+def test_where_no_rate_is_given_conformations_are_those_of_oscillations_like_in_training():
+    times = np.linspace(0.5, 10.0, 20)
+    creep, start = imposed_stress(times, np.ones(20)), start_up(1.0)
+    seen = see(Fluid(solvent_viscosity=0.1), [creep, start], [times, times], 2.0, 1.0)
+    told = [check_physics(seen, names).checks[0] for names in ({0: "creep"}, {0: "creep", 1: "b"})]
+    assert [one.passed for one in told] == [True, True]
+    assert told[0].where.startswith("oscillation at Wi = 2, ")
+    assert told[1].where == "b"
 
 
 def test_steady_slip_is_the_analytic_one():

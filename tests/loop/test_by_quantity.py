@@ -147,7 +147,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     assert told.startswith("To confirm edge fracture, ")
     assert told.endswith("watch the edge; repeat with another cone.")
     told = what_to_measure_next(result(FITTED))
-    assert told == "Measure N1 at 1 1/s."
+    assert told == "Measure N1 at 1 1/s: equally good laws differ by 60 %."
     normal = record("slow", 0.1, 0.05, quantity="N1")
     assert "uniaxial extension" in what_to_measure_next(result([*FITTED, normal]))
     # a normal stress that no transducer resolves is not asked for, one of twice the least is
@@ -162,6 +162,27 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
     assert again.startswith("Repeat fast with another gap")
+
+
+def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement():
+    def shifted(one, temperature, factor):
+        told = {"temperature_C_measured": temperature}
+        return replace(one, instrument_time=factor * one.time, conditions=told)
+
+    fitted = [shifted(one, -10.005, 0.01) for one in FITTED]
+    cold = [shifted(record(f"cold {rate:g}", rate, 0.2, True), -23.2, 0.1) for rate in (2.0, 5.0)]
+    told = range_of([*fitted, *cold])
+    assert told.rate_1_s == pytest.approx((0.1, 1.0))  # where the moduli and times hold
+    assert list(told.by_temperature) == [-10.0]
+    assert told.by_temperature[-10.0].rate_1_s == pytest.approx((10.0, 100.0))
+    found = result([*fitted, *cold])
+    assert errors_by_quantity(found)["sigma12"].beyond_at == "measured at 20–50 1/s at −23 °C"
+    assert what_to_measure_next(found).startswith("Measure N1 at 100 1/s and −10 °C: equally")
+    # what was not shifted, or has no known temperature, is told as it is
+    assert not range_of(FITTED).by_temperature
+    assert not range_of([*fitted, FITTED[0]]).by_temperature
+    at_reference = replace(FITTED[0], conditions={"temperature_C": -35.0})
+    assert list(range_of([*fitted, at_reference]).by_temperature) == [-10.0, -35.0]
 
 
 def test_a_range_of_rates_is_where_runs_stay():

@@ -18,7 +18,7 @@ from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DEGREE
 from discover.loop import DeclaredModel
 from discover.protocols import in_flow, start_up
-from discover.report.plots.by_mode import by_mode_picture
+from discover.report.plots.loop.residual import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES, NOISE = (0.3, 1.0, 4.0, 15.0, 60.0), 0.01

@@ -171,12 +171,13 @@ def test_residuals_hold_the_price_of_the_likeliest_factors(exact):
     theta[model.positions("giesekus_mobility")] = 0.25
     batch = make_batch([replace(run, loading=Loading(0.03, noise=0.01)) for run in data])
     plain = make_batch(list(data))
-    off, predicted = model.residuals([theta], plain)[0], model.predict(theta, plain)
+    predicted = model.predict(theta, plain)
+    off = plain.records.residual(predicted)
     predicted, noise = predicted * plain.weight, 0.01 / np.sqrt([[len(run)] for run in data])
     grid = np.linspace(-0.15, 0.15, 3001)
     left = [
         np.min([np.sum(((o + f * p) / n) ** 2) + (f / 0.03) ** 2 for f in grid])
         for o, p, n in zip(np.asarray(off), np.asarray(predicted), noise, strict=True)
     ]
-    found = np.sum((model.residuals([theta], batch)[0] / noise) ** 2, axis=1)
+    found = np.sum((batch.records.residual(model.predict(theta, batch)) / noise) ** 2, axis=1)
     assert np.allclose(found, left, rtol=1e-4)

@@ -6,7 +6,7 @@ import pytest
 from independent import Giesekus, of_rate, oscillation
 
 import discover as dc
-from discover.dataset.from_dataframe import from_dataframe
+from discover.dataset import from_dataframe
 from discover.dataset.records.thinning import thin_run
 from discover.protocols import (
     after_steady_flow,

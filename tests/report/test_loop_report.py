@@ -17,12 +17,10 @@ from discover.report.loop.tables import loop_verdict, noise_range, remaining_row
 from discover.report.page import render
 from discover.report.plots.loop.residual import (
     residual_picture,
-    run_error_picture,
     waterfall_picture,
 )
-from discover.report.plots.loop.runs import lissajous_picture, rivals_picture, runs_picture
-from discover.report.plots.residual_map import levels, loop_residual_map
-from discover.report.plots.style import in_last_cycle
+from discover.report.plots.loop.runs import lissajous_picture, runs_picture
+from discover.report.plots.style import figure, in_last_cycle, make_percentage, picture
 from discover.study import RunFolder
 
 
@@ -66,7 +64,7 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(written):
     assert stands_alone(page)
     assert "<i>name" not in page
     assert r"a&lt;b&gt;$\frac$.csv" in page
-    names = ("waterfall", "runs", "residual_map", "residual", "reading", "run_errors", "ranking")
+    names = ("waterfall", "runs", "residual")
     for name in names:
         assert f'<figure id="{name}">' in page
         assert (written / "figures" / f"{name}.svg").is_file()
@@ -272,11 +270,6 @@ def test_data_too_long_for_a_page_lie_beside_it():
     assert 'data-name="long.csv"' not in page
 
 
-def test_one_run_has_no_residual_map():
-    assert loop_residual_map(loop_result()) is not None
-    assert loop_residual_map(replace(loop_result(), records=(oscillating(),))) is None
-
-
 def without_stages():
     """A loop that added nothing: one prediction and one error a run."""
     found = loop_result()
@@ -311,7 +304,7 @@ def test_a_mean_of_held_out_runs_says_which_are_in_it_alone():
 
 def test_effects_are_named_only_where_some_were_added():
     with_stage, without = loop_result(), without_stages()
-    for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
+    for draw in (runs_picture, residual_picture):
         assert "with effects" in draw(with_stage).svg
         drawn = draw(without).svg
         assert "with effects" not in drawn
@@ -367,57 +360,10 @@ def test_the_last_cycle_is_one_period_long():
     assert shown[-1] - shown[0] == pytest.approx(2.0 * np.pi, rel=0.03)
 
 
-def test_levels_of_a_residual_map_keep_sign_and_order():
-    found = levels(np.array([-2.0, -0.25, 0.0, 0.004, 0.25, 1.0]), 1.0)
-    assert found.tolist() == [-6, -3, 0, 0, 3, 6]
-
-
-def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
-    drawn = loop_residual_map(loop_result())
-    # what a run is called is text, whatever stands in it
-    assert r"a&lt;b&gt;$\frac$" in drawn.svg
-    assert "c (held out)" in drawn.svg
-    assert "strain" in drawn.svg  # start-ups sampled over decades
-    two = (oscillating(), oscillating("held.csv", True))
-    assert "time (s)" in loop_residual_map(replace(loop_result(), records=two)).svg
-    assert drawn.svg.count("colour scale ±") == 2
-
-
-def several_explanations():
-    """Two explanations of the same runs, the second a tenth too high."""
-    result = loop_result()
-    records = tuple(
-        replace(r, by_explanation=np.stack([r.predicted[-1], 1.1 * r.measured]))
-        for r in result.records
-    )
-    told = Explanations(
-        (
-            Explanation(("stress_gain",), 0.6, ErrorPair(0.01, 0.2), {}),
-            Explanation(("wall_slip",), 0.2, ErrorPair(0.1, 0.1), {}),
-        ),
-        0.2,
-    )
-    return replace(result, records=records, explanations=told)
-
-
-def test_the_residual_of_each_explanation_stands_beside_the_one_that_was_found():
-    result = several_explanations()
-    drawn = rivals_picture(result)
-    assert drawn is not None
-    assert len(drawn.axes) == 2
-    assert drawn.axes[0]["y"] == drawn.axes[1]["y"]  # one scale
-    # the larger residual, a tenth of each run's size at its end, sets it
-    assert drawn.axes[0]["y"][1] > 10.0
-    assert "found by the search" in drawn.svg
-    # negative control: one explanation has no rival
-    one = replace(result.explanations, likeliest_first=result.explanations.likeliest_first[:1])
-    assert rivals_picture(replace(result, explanations=one)) is None
-
-
 def test_a_short_axis_of_errors_has_a_number_to_read():
     """From 23 to 47 % there is neither a decade nor a 2 or a 5."""
-    result = without_stages()
-    sizes = zip(result.records, (0.23, 0.47), strict=True)
-    records = tuple(replace(r, errors=np.array([e])) for r, e in sizes)
-    drawn = run_error_picture(replace(result, records=records)).svg
-    assert {"30", "40"} <= set(re.findall(r">(\d+)</text>", drawn))
+    with figure(1, 1) as (drawing, axes):
+        axes[0, 0].plot([23.0, 47.0], [0.0, 1.0])
+        make_percentage(axes[0, 0].xaxis)
+        svg = picture(drawing, "a", "b").svg
+    assert {"30", "40"} <= set(re.findall(r">(\d+)</text>", svg))

@@ -28,7 +28,6 @@ from discover.report.plots.comparison.selection import (
     selection_picture,
     third_harmonic,
 )
-from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.style import SPARSE, style_sheet
 from discover.report.wording import percent, selection_sentence
 from discover.study import RunFolder, parse_study
@@ -53,9 +52,7 @@ def comparison():
             "data": {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 21}},
             "compare": {
                 "high_deborah": [1.5],
-                "next": {"flows": ["laos", "uniaxial"]},
                 "library": {"degree": 0},
-                "sweep": {"laws": ["ptt_linear"], "parameter": "epsilon", "values": [0.1]},
             },
         }
     )
@@ -127,9 +124,8 @@ def test_identifiers_are_unique(page):
 
 
 def test_the_page_has_the_papers_pictures_and_tables(page):
-    names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss", "sweep")
-    maps = ("pipkin_error", "residual_map")
-    for name in (*names, *maps, "training"):
+    names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss")
+    for name in (*names, "pipkin_error", "training"):
         assert f'<figure id="{name}">' in page
     for text in ("penalised", "debiased", "95 % interval", "σ₁₂", "N₂", "not determined"):
         assert text in page
@@ -193,7 +189,6 @@ def test_a_curve_that_ran_away_is_left_out(comparison):
     everywhere = dict.fromkeys(outcome.predictions)
     none = replace(outcome, predictions=everywhere)
     without = replace(comparison, outcomes={**comparison.outcomes, "tbnn_ude": none})
-    assert "neural network" not in comparison_residual_map(without).svg
     assert texts_of(error_map_picture(without).svg).count("–") == 3 * 16
 
 

@@ -75,7 +75,7 @@ def test_both_moduli_of_a_sweep_are_solved_for_once_and_each_run_has_its_own(of_
     # of the other two scipy tells above
     alone = of_fluid(lay_out(protocols[1:2], [COUNTED[:2]]))[0, :, 0]
     # both end where Newton's next step would change 1e-8
-    np.testing.assert_allclose(found[1][flows.sample_mask[1]], alone, rtol=1e-7)
+    np.testing.assert_allclose(found[1][: len(alone)], alone, rtol=1e-7)
 
 
 def swept(law, strains):

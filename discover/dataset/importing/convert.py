@@ -18,10 +18,9 @@ from discover.dataset.importing.folder_files import (
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName
 from discover.dataset.importing.names import alternatives
-from discover.dataset.importing.oscillations import waves_of, without_names
+from discover.dataset.importing.oscillations import waves_of
 from discover.dataset.importing.quantities import (
     UnsaidUnits,
-    guess_columns,
     require_units,
     units_taken_as_si,
 )
@@ -42,9 +41,6 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     if found is None:
         rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
         found = blocks_of_rows(rows, layout.header_row)
-        if not any(guess_columns(block, mapping.columns) for block in found):
-            wave = without_names(rows)
-            found = found if wave is None else [wave]
         require_blocks(found, path.name)
     alone = [one for block in found for one in tests_side_by_side(block)]
     parts = [part for one in alone for part in tests_in_rows(one, mapping, path.name)]

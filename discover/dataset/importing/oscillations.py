@@ -1,14 +1,11 @@
 """Oscillations sample by sample: of what, from which start, and where exports hide them."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import fminbound
 
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_number
 
 Values = Float[np.ndarray, " n"]
 
@@ -21,7 +18,6 @@ _AT_ONCE = 0.02
 _FAR = 0.3
 _WHOLE = 1e-3  # share of a period up to which a record is as long as one
 _FEWEST = 32
-_DERIVATIVE = 0.05  # misfit to the derivative of another column, up to which one is its rate
 
 
 def alternates(values: Values) -> bool:
@@ -101,9 +97,7 @@ def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
 
 
 # RheoCompass writes the samples of each point below it, in columns of their own, with the number of
-# the point left empty and often without a time. MITlaos and SPP take tables without names: time,
-# strain and stress, and time, strain, rate and stress   [Ewoldt, Hosoi & McKinley 2008, J. Rheol.
-# 52, 1427; Donley, Singh, Shetty & Rogers 2020, PNAS 117, 21945].
+# the point left empty and often without a time.
 
 
 def waves_of(readings: Readings) -> list[Block]:
@@ -147,29 +141,3 @@ def waves_of(readings: Readings) -> list[Block]:
         name = f"{readings.block.name} waveform of point {point}".strip()
         found.append(Block.of(columns, name))
     return found
-
-
-def without_names(rows: Sequence[Sequence[str]]) -> Block | None:
-    """Time, strain, (rate,) and stress in SI units of a table without names; None if it is none."""
-    filled = [[cell for cell in row if cell] for row in rows]
-    numbers = [row for row in filled if row and all(map(is_number, row))]
-    if len(numbers) < _FEWEST or len({len(row) for row in numbers}) != 1:
-        return None
-    if len(numbers) < len([row for row in filled if row]) - 5:
-        return None
-    values: Float[np.ndarray, "n columns"] = np.array(numbers, dtype=float)
-    if values.shape[1] not in (3, 4) or np.any(np.diff(values[:, 0]) <= 0.0):
-        return None
-    time, strain, stress = values[:, 0], values[:, 1], values[:, -1]
-    if not (alternates(strain) and alternates(stress)):
-        return None
-    omega = frequency_of(time, strain)
-    if np.std(strain - _series(time, strain, omega, 1)[0]) > _DERIVATIVE * np.std(strain):
-        return None  # the second column is no imposed sine
-    named = {"time": ("s", time), "strain": ("", strain)}
-    if values.shape[1] == 4:
-        rate, slope = values[:, 2], np.gradient(strain, time)
-        if np.std(rate - slope) > _DERIVATIVE * np.std(slope):
-            return None
-        named["shear_rate"] = ("1/s", rate)
-    return Block.of({**named, "stress": ("Pa", stress)}, "waveform without names")

@@ -1,1 +1,1 @@
-"""Linear tests at several temperatures, and what they say of one another."""
+"""Linear sweeps: the modes that they support, and sweeps at several temperatures moved to one."""

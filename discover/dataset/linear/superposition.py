@@ -1,26 +1,221 @@
-"""Time–temperature superposition: tests at several temperatures as one, and how well that holds.
+"""Time–temperature superposition: sweeps at several temperatures as one, and how well that holds.
 
-Neighbouring tests are laid over each other by log a_T, and log b_T if asked for, that make the logs
-of their values agree best; shifts add up from the reference temperature [Ferry 1980, ch. 11].
-Sweeps lead where there are sweeps: they see the temperature in two curves.
+Neighbouring sweeps are laid over each other by log a_T, and log b_T if asked for, that leave one
+smooth curve through the logs of both moduli the least scatter; shifts add up from the reference
+temperature [Ferry 1980, ch. 11].
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
+from numpy.polynomial.chebyshev import chebvander
 from scipy.constants import R
-from scipy.optimize import curve_fit
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import curve_fit, least_squares
+from scipy.stats import f as variance_ratio
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from discover.dataset.linear.linear_tests import SWEEP, LinearTest, Tests, of_sweep
-from discover.dataset.linear.overlap import lay_over, overlap_misfit
 from discover.dataset.linear_viscoelasticity import LinearSweep
-from discover.errors import InputError
-from discover.statistics.noise.noise_model import rms
+from discover.dataset.load import TESTS_FILE, read_sweep
+from discover.dataset.tables.table import read_table
+from discover.errors import InputError, Problems
+from discover.statistics.noise.noise_model import independent_samples, rms
+from discover.words import did_you_mean
+
+_FEWEST = 4  # samples of each in the overlap, below which neighbours are not laid over
+_STEPS = 241
+_FACTOR_TWO = 0.3
+# Of two overlaps whose misfits differ by no more than such noise would in this share of cases, the
+# longer one counts
+_CHANCE = 0.99
+_TURNS = 3  # how often a shift is fitted: by it samples come into the overlap or leave it
+# Largest degree of the smooth curve, and fewest samples for each of its constants: logs of moduli
+# bend slowly. Schwarz's criterion chooses, with twice its penalty: a bend that is noise would seem
+# to know the shift of a straight line
+_LARGEST_DEGREE, _SAMPLES_A_CONSTANT = 8, 2
+_UNKNOWN = 2.0  # standard error in decades of a shift of which an overlap says nothing
+_DECADE = np.log(10.0)
+
+# root-mean-square relative misfit in an overlap up to which sweeps superpose, about what two
+# loadings of one sample differ by, and from which on they do not
+SUPERPOSED, FAILED = 0.05, 0.1
+_TWO_SIDED = float(norm.ppf(0.975))
+
+
+def read_sweeps(root: Path) -> dict[float, LinearSweep]:
+    """Return the sweeps of a folder by temperature in °C, as ``tests.csv`` lists them.
+
+    Raises InputError if the list or a file is wrong.
+    """
+    missing = "Sweeps at several temperatures are listed there; write one with the columns file, "
+    table = read_table(root / TESTS_FILE, TESTS_FILE, missing + "test and temperature_C.")
+    problems = Problems()
+    for column in ("file", "test", "temperature_C"):
+        if column not in table.columns:
+            problems.add(
+                f"{TESTS_FILE} has no column {column!r}; it has {table.listed}."
+                f"{did_you_mean(column, table.columns)} Add it."
+            )
+    problems.require_none(TESTS_FILE)
+    found: dict[float, LinearSweep] = {}
+    degrees = table.numbers("temperature_C").tolist()
+    for celsius, name, test in zip(
+        degrees, table.columns["file"], table.columns["test"], strict=True
+    ):
+        if test.strip() != "lve":
+            continue
+        if Path(name).name != name:
+            raise InputError(f"{TESTS_FILE} names {name!r}; put the file itself in the folder.")
+        if celsius in found:
+            raise InputError(f"{TESTS_FILE} has two sweeps at {celsius:g} °C; keep one of them.")
+        found[celsius] = read_sweep(root / name)
+    return found
+
+
+class _Pair(NamedTuple):
+    """Log moduli, shape (2, n), over log frequencies of two neighbours."""
+
+    x: Float[np.ndarray, " n"]  # of the colder
+    cold: Float[np.ndarray, "2 n"]
+    z: Float[np.ndarray, " m"]  # of the warmer
+    warm: Float[np.ndarray, "2 m"]
+
+    def inside(self, shift: float) -> np.ndarray:
+        """Return which samples of the warmer lie in the range of the colder."""
+        moved = self.z + shift
+        return np.flatnonzero((moved >= self.x[0]) & (moved <= self.x[-1]))
+
+    def off(self, shift: float, rows: np.ndarray) -> Float[np.ndarray, "2 k"]:
+        """Return what log moduli of the warmer lie above those of the colder."""
+        through = PchipInterpolator(self.x, self.cold, axis=1)
+        return self.warm[:, rows] - through(self.z[rows] + shift)
+
+
+def _logs(sweep: LinearSweep, where: str) -> tuple[np.ndarray, np.ndarray]:
+    omega, first = np.unique(sweep.angular_frequency, return_index=True)
+    if len(omega) < _FEWEST:
+        raise InputError(
+            f"Shifting needs {_FEWEST} frequencies in each sweep, and one of those at {where} has "
+            f"{len(omega)}. Leave it out with --between."
+        )
+    return np.log10(omega), np.log10(sweep.measured[:, first])
+
+
+Overlap = tuple[Float[np.ndarray, " 2"], Float[np.ndarray, " 2"]]
+"""log10 of a_T and b_T of the warmer over the colder, and their variances."""
+
+
+def lay_over(cold: LinearSweep, warm: LinearSweep, vertical: bool, where: str) -> Overlap:
+    """Return the shift that lays a sweep over that at a lower temperature.
+
+    `vertical`: whether moduli too may be moved. `where`: the two temperatures, in words. Raises
+    InputError if nothing overlaps, or only curves of other shapes.
+    """
+    pair = _Pair(*_logs(cold, where), *_logs(warm, where))
+    # power laws slide along themselves if they may move up too: first without that
+    starts = (_longest(pair, up) for up in ((False, True) if vertical else (False,)))
+    start = next((start for start in starts if start is not None), None)
+    if start is None:
+        raise InputError(
+            f"No shift in time brings the sweeps at {where} within a factor of two of each other. "
+            "They share no moduli, or differ in more than time; measure between them, or leave "
+            "temperatures out with --between."
+        )
+    found = _refined(pair, start, vertical)
+    for _ in range(_TURNS - 1):
+        # what is not determined is not followed
+        is_known = np.sqrt(found[1][0]) < _FACTOR_TWO
+        if is_known and len(pair.inside(found[0][0])) >= _FEWEST:
+            found = _refined(pair, float(found[0][0]), vertical)
+    return found
+
+
+def _longest(pair: _Pair, up: bool) -> float | None:
+    """Return log a_T of the longest overlap of those that agree best; None if none agree."""
+
+    def misfit(shift: float) -> tuple[float, float]:
+        rows = pair.inside(shift)
+        if len(rows) < _FEWEST:
+            return np.inf, 0.0
+        off = pair.off(shift, rows)
+        return float(np.var(off) if up else np.mean(off**2)), float(off.size)
+
+    trials = np.linspace(pair.x[0] - pair.z[-1], pair.x[-1] - pair.z[0], _STEPS)
+    squares, counts = np.array([misfit(shift) for shift in trials]).T
+    best = int(np.argmin(squares))
+    if not squares[best] < _FACTOR_TWO**2:
+        return None
+    # few samples may agree by chance: of all overlaps that are no worse, the one with most
+    chance = variance_ratio.ppf(_CHANCE, np.maximum(counts, 1.0), max(counts[best] - 1.0, 1.0))
+    alike = np.flatnonzero(squares <= chance * squares[best])
+    return float(trials[alike[np.lexsort((squares[alike], -counts[alike]))[0]]])
+
+
+def _refined(pair: _Pair, start: float, vertical: bool) -> Overlap:
+    """Return the shift by which one smooth curve goes through both sweeps best.
+
+    A curve drawn through the samples of one of them would bend with its noise, and seem to know the
+    shift from bends that are none.
+    """
+    rows = pair.inside(start)
+    moved = pair.z[rows] + start
+    # the samples of the colder on both sides of the end ones are needed to lie between them
+    first = max(int(np.searchsorted(pair.x, moved.min(), "right")) - 1, 0)
+    last = min(int(np.searchsorted(pair.x, moved.max(), "left")), len(pair.x) - 1)
+    x, cold = pair.x[first : last + 1], pair.cold[:, first : last + 1]
+    low, high = min(x[0], moved.min()), max(x[-1], moved.max())
+    n = len(x) + len(rows)
+
+    def left(which: int, degree: int, shift: float, up: float) -> Float[np.ndarray, " n"]:
+        places = np.concatenate([x, pair.z[rows] + shift])
+        values = np.concatenate([cold[which], pair.warm[which, rows] - up])
+        basis = chebvander((2.0 * places - low - high) / (high - low), degree)
+        return values - basis @ np.linalg.lstsq(basis, values)[0]
+
+    up = float(np.mean(pair.off(start, rows))) if vertical else 0.0
+
+    def criterion(which: int, degree: int) -> float:
+        square = max(float(np.sum(left(which, degree, start, up) ** 2)), 1e-300)
+        return n * np.log(square) + 2.0 * (degree + 1) * np.log(n)
+
+    most = max(min(_LARGEST_DEGREE, n // _SAMPLES_A_CONSTANT - 1), 1)
+    curves = [
+        (which, min(range(1, most + 1), key=lambda degree, which=which: criterion(which, degree)))
+        for which in range(2)
+    ]
+
+    first_guess = np.array([start, up] if vertical else [start])
+
+    def all_left(shift: np.ndarray) -> list[np.ndarray]:
+        return [left(*curve, shift[0], shift[1] if vertical else 0.0) for curve in curves]
+
+    # straight lines slide along themselves: their shift stays near, and its error is large
+    held = rms(np.concatenate(all_left(first_guess))) / _UNKNOWN
+    fit = least_squares(
+        lambda shift: np.concatenate([*all_left(shift), held * (shift - first_guess)]),
+        first_guess,
+        x_scale=0.1,
+    )
+    parts = [part for one in all_left(fit.x) for part in np.split(one, [len(x)])]
+    spent = len(first_guess) + sum(degree + 1 for _, degree in curves)
+    share = max(2 * n - spent, 1) / (2 * n)
+    alone = min(sum(independent_samples(part) for part in parts), 2.0 * n) * share
+    # what neighbours share, such as a shape that differs, counts once
+    variance = sum(float(part @ part) for part in parts) / max(alone, 1.0)
+    # few independent samples: their scatter is itself uncertain
+    wide = student.ppf(0.975, max(alone, 1.0)) / _TWO_SIDED
+    variances = np.append(wide**2 * variance * np.diag(np.linalg.inv(fit.jac.T @ fit.jac)), [0.0])[
+        :2
+    ]
+    return np.append(fit.x, [0.0])[:2], variances
 
 
 @dataclass(frozen=True)
@@ -47,7 +242,7 @@ _LAWS = {
     ),
     "Arrhenius": (
         lambda celsius, at, energy: (
-            energy / R / np.log(10.0) * (1.0 / (celsius + 273.15) - 1.0 / (at + 273.15))
+            energy / R / _DECADE * (1.0 / (celsius + 273.15) - 1.0 / (at + 273.15))
         ),
         {"activation_energy_J_mol": 5e4},
     ),
@@ -61,13 +256,13 @@ def _fit_law(name: str, celsius, log_shift, at: int) -> ShiftLaw | None:
     if np.sum(others) <= len(start):
         return None
     reference = float(celsius[at])
-    coldest = reference - float(celsius[0])
+    first = list(start.values())
+    if name == "WLF":
+        first[-1] = max(first[-1], 1.5 * (reference - float(celsius[0])))
 
     def of(temperatures, *free):
         return law(temperatures, reference, *free)
 
-    first = list(start.values())
-    first[-1] = max(first[-1], 1.5 * coldest) if name == "WLF" else first[-1]
     try:
         values, covariance = curve_fit(of, celsius[others], log_shift[others], p0=first)
     except RuntimeError:  # no such law near these shifts
@@ -78,63 +273,51 @@ def _fit_law(name: str, celsius, log_shift, at: int) -> ShiftLaw | None:
         key: (float(value - half), float(value + half)) if half < abs(value) else None
         for key, value, half in zip(start, values, wide, strict=True)
     }
-    known = {key: float(value) for key, value in zip(start, values, strict=True)}
-    return ShiftLaw(name, known, intervals, rms(left))
-
-
-# root-mean-square relative misfit in an overlap up to which tests superpose, about what two
-# loadings of one sample differ by, and from which on they do not
-SUPERPOSED, FAILED = 0.05, 0.1
-_TWO_SIDED = float(norm.ppf(0.975))
+    return ShiftLaw(name, dict(zip(start, values.tolist(), strict=True)), intervals, rms(left))
 
 
 @dataclass(frozen=True)
 class Superposition:
-    """Tests at several temperatures, moved to one."""
+    """Sweeps at several temperatures, moved to one."""
 
     reference: float  # in °C
     celsius: Float[np.ndarray, " n"]  # temperatures, increasing
-    tests: Tests  # as measured, by kind and temperature
-    leading: tuple[str, ...]  # the kinds that the shifts were found from
+    sweeps: Mapping[float, LinearSweep]  # as measured, by temperature
     log_shift: Float[np.ndarray, " n"]  # log10 of a_T
     log_vertical: Float[np.ndarray, " n"]  # log10 of b_T
     error: Float[np.ndarray, "n 2"]  # standard errors of both
     laws: tuple[ShiftLaw, ...]  # fitted to a_T; fewer where there are too few temperatures
-    apart: tuple[float, ...] = ()  # temperatures that share no kind with the others, not moved
 
-    def moved(self, kind: str, celsius: float) -> LinearTest:
-        """Return the test at a temperature as it would be at the reference."""
-        at = int(np.flatnonzero(self.celsius == celsius)[0])
-        return self.tests[kind][celsius].moved(
-            float(self.log_shift[at]), float(self.log_vertical[at])
-        )
+    @cached_property
+    def moved(self) -> dict[float, LinearSweep]:
+        """The sweeps as they would be at the reference: ω a_T, G/b_T."""
+        shifts = zip(self.celsius.tolist(), self.log_shift, self.log_vertical, strict=True)
+        return {
+            at: LinearSweep(one.angular_frequency * 10.0**a, *(one.measured / 10.0**b))
+            for at, a, b in shifts
+            for one in [self.sweeps[at]]
+        }
 
-    def _all_moved(self, kind: str) -> dict[float, LinearTest]:
-        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
-        return {celsius: self.moved(kind, celsius) for celsius in there}
-
-    def misfits(self, kind: str) -> dict[tuple[float, float], float]:
-        """Return the root-mean-square relative misfit of neighbours where they overlap."""
-        moved = self._all_moved(kind)
-        found = {(a, b): overlap_misfit(moved[a], moved[b]) for a, b in pairwise(moved)}
-        return {pair: misfit for pair, misfit in found.items() if misfit is not None}
-
-    def verdict_of(self, kind: str) -> str:
-        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap of a kind.
-
-        Doubtful too where nothing overlaps: no misfit is not a small one.
-        """
-        misfits = self.misfits(kind)
-        worst = max(misfits.values(), default=0.0)
-        if misfits and worst <= SUPERPOSED:
-            return "superposed"
-        return "doubtful" if worst < FAILED else "not_superposed"
+    @cached_property
+    def misfits(self) -> dict[tuple[float, float], float]:
+        """Root-mean-square relative misfit of neighbours where they overlap."""
+        found = {}
+        for cold, warm in pairwise(self.moved):
+            pair = _Pair(*(part for at in (cold, warm) for part in _logs(self.moved[at], "")))
+            if len(rows := pair.inside(0.0)) >= _FEWEST:
+                found[cold, warm] = float(_DECADE * rms(pair.off(0.0, rows)))
+        return found
 
     @property
     def verdict(self) -> str:
-        """The worst verdict of the kinds that the shifts were found from."""
-        ranked = ("not_superposed", "doubtful", "superposed")
-        return min((self.verdict_of(kind) for kind in self.leading), key=ranked.index)
+        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap.
+
+        Doubtful too where nothing overlaps: no misfit is not a small one.
+        """
+        worst = max(self.misfits.values(), default=0.0)
+        if self.misfits and worst <= SUPERPOSED:
+            return "superposed"
+        return "doubtful" if worst < FAILED else "not_superposed"
 
     def factors(self, at: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return a_T and b_T at a temperature, each with its 95 % interval."""
@@ -145,102 +328,53 @@ class Superposition:
         )
         return a, b  # pyright: ignore[reportReturnType]
 
-    def master(self, kind: str) -> LinearTest | None:
-        """Return all moved tests of a kind as one; None where they do not become one."""
-        moved = list(self._all_moved(kind).values())
-        if not moved or "not_superposed" in (self.verdict, self.verdict_of(kind)):
+    def master(self) -> LinearSweep | None:
+        """Return all moved sweeps as one; None where they do not become one."""
+        if self.verdict == "not_superposed":
             return None
-        argument = np.concatenate([one.argument for one in moved])
-        order = np.argsort(argument, kind="stable")
-        if kind != SWEEP:  # a table over time has no time twice
-            order = order[np.diff(argument[order], prepend=0.0) > 0.0]
-        values = np.concatenate([one.values for one in moved], axis=1)
-        spread = np.concatenate([one.spread for one in moved])
-        return LinearTest(kind, argument, values, spread).select(order)
+        omega = np.concatenate([one.angular_frequency for one in self.moved.values()])
+        moduli = np.concatenate([one.measured for one in self.moved.values()], axis=1)
+        order = np.argsort(omega, kind="stable")
+        return LinearSweep(omega[order], *moduli[:, order])
+
+    def table(self) -> pd.DataFrame:
+        """Return temperatures, shift factors and misfits, as ``shift_factors.csv`` has them."""
+        ends = ("", "_low95", "_high95")
+        names = [f"{factor}{end}" for factor in ("a_T", "b_T") for end in ends]
+        factors = [sum(self.factors(i), ()) for i in range(len(self.celsius))]
+        table = pd.DataFrame(factors, columns=names)
+        table.insert(0, "temperature_C", self.celsius)
+        misfits = {cold: misfit for (cold, _), misfit in self.misfits.items()}
+        return table.assign(misfit_to_next=[misfits.get(at) for at in self.celsius.tolist()])
 
 
 def superpose(
-    tests: Tests | Mapping[float, LinearSweep],
-    reference: float | None = None,
-    vertical: bool = False,
+    sweeps: Mapping[float, LinearSweep], reference: float | None = None, vertical: bool = False
 ) -> Superposition:
-    """Return tests by kind and temperature, or sweeps by temperature, moved to one of them.
+    """Return sweeps by temperature in °C, moved to one of them.
 
-    `reference` in °C; the middle one if None. `vertical`: whether moduli and compliances too may be
-    moved. Raises InputError if there is no test there, or neighbours share too few values.
+    `reference` in °C; the middle one if None. `vertical`: whether moduli too may be moved. Raises
+    InputError if there is no sweep there, or neighbours share too few values.
     """
-    sweeps = {t: of_sweep(one) for t, one in tests.items() if isinstance(one, LinearSweep)}
-    known: Tests = {SWEEP: sweeps} if sweeps else tests  # pyright: ignore[reportAssignmentType]
-    several = {kind: at for kind, at in known.items() if len(at) > 1}
-    if not several:
-        raise InputError("Shifting needs tests of one kind at two temperatures; got none.")
-    main = several.get(SWEEP) or next(iter(several.values()))
-    middle = sorted(main)[len(main) // 2]
-    reference = middle if reference is None else reference
-    every = sorted({celsius for at in known.values() for celsius in at})
+    every = sorted(sweeps)
+    if len(every) < 2:
+        raise InputError(
+            f"Shifting needs sweeps at two temperatures; got {len(every)}. List more of them in "
+            f"{TESTS_FILE} as tests lve, or widen --between."
+        )
+    reference = every[len(every) // 2] if reference is None else reference
     if reference not in every:
         listed = ", ".join(f"{t:g}" for t in every)
-        raise InputError(f"There is no test at {reference:g} °C. Take one of {listed}.")
-    found, leading = _walk(several, reference, vertical)
-    celsius = np.array(sorted(found))
-    shifts = np.array([found[t][0] for t in celsius])
-    errors = np.sqrt([np.diag(found[t][1]) for t in celsius])
-    at = int(np.flatnonzero(celsius == reference)[0])
-    fitted = (_fit_law(name, celsius, shifts[:, 0], at) for name in _LAWS)
-    laws = tuple(law for law in fitted if law is not None)
-    apart = tuple(t for t in every if t not in found)
-    log_a, log_b = shifts.T
-    return Superposition(reference, celsius, known, leading, log_a, log_b, errors, laws, apart)
-
-
-def _walk(several: Tests, reference: float, vertical: bool):
-    """Return the sum of shifts and of their covariances by temperature, and the leading kinds.
-
-    From the reference on, the next temperature is one that a sweep ties to those reached, then one
-    that any other test does, the nearest first.
-    """
-    reached = {reference: (np.zeros(2), np.zeros((2, 2)))}
-    leading: dict[str, None] = {}
-    links = [
-        (kind != SWEEP, warm - cold, cold, warm)
-        for kind, at in several.items()
-        for cold, warm in pairwise(sorted(at))
+        raise InputError(f"There is no sweep at {reference:g} °C. Take one of {listed}.")
+    laid = [
+        lay_over(sweeps[cold], sweeps[warm], vertical, f"{cold:g} and {warm:g} °C")
+        for cold, warm in pairwise(every)
     ]
-    while open_ := [link for link in links if (link[2] in reached) != (link[3] in reached)]:
-        table, _, cold, warm = min(open_)
-        kinds = [k for k in several if (k != SWEEP) == table and {cold, warm} <= set(several[k])]
-        leading.update(dict.fromkeys(kinds))
-        below, above = ({kind: several[kind][t] for kind in kinds} for t in (cold, warm))
-        laid = lay_over(below, above, vertical, f"{cold:g} and {warm:g} °C")
-        start, end, sign = (cold, warm, 1.0) if cold in reached else (warm, cold, -1.0)
-        shift, covariance = reached[start]
-        reached[end] = (shift + sign * laid.shift, covariance + laid.covariance)
-    return reached, tuple(leading)
-
-
-def shift_table(found: Superposition) -> str:
-    """Return temperatures, shift factors and misfits as the text of ``shift_factors.csv``."""
-    head = ["temperature_C", "a_T", "a_T_low95", "a_T_high95", "b_T", "b_T_low95", "b_T_high95"]
-    misfits = {kind: found.misfits(kind) for kind in found.tests}
-    names = ["misfit_to_next" if kind == SWEEP else f"{kind}_misfit_to_next" for kind in misfits]
-    rows = [[*head, *names]]
-    for i, degrees in enumerate(found.celsius):
-        off = [
-            next((f"{m:.4g}" for (cold, _), m in pairs.items() if cold == degrees), "")
-            for pairs in misfits.values()
-        ]
-        numbers = [repr(value) for factor in found.factors(i) for value in factor]
-        rows.append([f"{degrees:g}", *numbers, *off])
-    return "\n".join(",".join(row) for row in rows) + "\n"
-
-
-def move_tests(
-    tests: Tests, reference: float | None, vertical: bool, between: tuple[float, float] | None
-) -> Superposition:
-    """Return tests between two temperatures in °C moved to one."""
-    if between is not None:
-        low, high = min(between), max(between)
-        chosen = {k: {t: one for t, one in at.items() if low <= t <= high}
-                  for k, at in tests.items()}  # fmt: skip
-        tests = {kind: at for kind, at in chosen.items() if at}
-    return superpose(tests, reference, vertical)
+    at = every.index(reference)
+    total, variance = np.cumsum([(np.zeros(2), np.zeros(2)), *laid], axis=0).swapaxes(0, 1)
+    log_a, log_b = (total - total[at]).T
+    celsius = np.array(every)
+    fitted = (_fit_law(name, celsius, log_a, at) for name in _LAWS)
+    laws = tuple(law for law in fitted if law is not None)
+    error = np.sqrt(np.abs(variance - variance[at]))
+    return Superposition(reference, celsius, dict(sweeps), log_a, log_b, error, laws)

@@ -318,7 +318,7 @@ def filled(
         header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
-        modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
+        modes=repr([(float(g), float(time)) for g, time in pairs]),
         solvent=repr(float(equation.solvent_viscosity)), tested=_tested(equation),
         constants=constants or "",
         mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
@@ -358,24 +358,21 @@ def _of_states(equation: Equation, notation: CodeNotation, by_name: bool) -> dic
 def _constants(equation: Equation) -> str:
     """Return the constants of the named law, one table for each mode."""
     assert equation.named is not None
-    each = [equation.named.of_mode(k) for k in range(len(equation.modulus))]
-    rows = [", ".join(f'"{n}": {float(v)!r}' for n, v in one.items()) for one in each]
-    return "[" + ", ".join(f"{{{row}}}" for row in rows) + "]"
+    each = (equation.named.of_mode(k) for k in range(len(equation.modulus)))
+    return repr([{name: float(value) for name, value in one.items()} for one in each])
 
 
 def _numbers(values: Sequence[float]) -> str:
-    return "[" + ", ".join(repr(float(value)) for value in values) + "]"
+    return repr([float(value) for value in values])
 
 
 def _tested(equation: Equation) -> str:
-    if equation.tested is None:
+    tested = equation.tested
+    if tested is None:
         return "None"
-    boxes = {"learned_in": equation.tested.learned_in, "judged_in": equation.tested.judged_in}
-    parts = []
-    for name, box in boxes.items():
-        if box is None:
-            parts.append(f'"{name}": None')
-        else:
-            spans = (f'"Wi": {_numbers(box.weissenberg)}', f'"De": {_numbers(box.deborah)}')
-            parts.append(f'"{name}": {{{", ".join(spans)}}}')
-    return "{" + ", ".join(parts) + "}"
+    boxes = {"learned_in": tested.learned_in, "judged_in": tested.judged_in}
+    ends = {
+        name: box and {"Wi": [*map(float, box.weissenberg)], "De": [*map(float, box.deborah)]}
+        for name, box in boxes.items()
+    }
+    return repr(ends)

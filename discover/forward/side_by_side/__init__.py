@@ -3,7 +3,7 @@
 from discover.forward.side_by_side.code import code_of
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.periodic import PeriodicCode, PeriodicSideBySide
-from discover.forward.side_by_side.predictors import Asked
+from discover.forward.side_by_side.predictors import Asked, MadeOnce
 from discover.forward.side_by_side.steady import SteadyCode, SteadySideBySide
 from discover.forward.side_by_side.stress import StressCode, StressSideBySide
 from discover.forward.side_by_side.transients import SideBySide, intervals
@@ -11,6 +11,7 @@ from discover.forward.side_by_side.transients import SideBySide, intervals
 __all__ = [
     "Asked",
     "Kernel",
+    "MadeOnce",
     "PeriodicCode",
     "PeriodicSideBySide",
     "SideBySide",

@@ -69,7 +69,8 @@ class Code:
 
     `counts`, `arrays`: the whole numbers and arrays it takes; `wide`: arrays of all lanes; `whole`:
     of whole numbers. `found`: shapes of its data, from `laid_out`. `flow`: kinematics of one run;
-    None where all are simple shear.
+    None where all are simple shear. `size`: numbers of a mode: σ11, σ22, σ33, σ12, and structure
+    variables.
     """
 
     counts: ClassVar[tuple[str, ...]]
@@ -88,7 +89,7 @@ class Code:
         self._law = eqx.combine(found[0].law, found[1].law)
         self._plain_law = eqx.filter(self._law, _is_shape, inverse=True)
         # of a mode, and kinds of weights that its step has
-        self._size = 4 + self._law.variables
+        self.size = 4 + self._law.variables
         relaxations = found[0].relaxations
         self._kinds = 1 if relaxations is None else 2 * relaxations.shape[1]
 
@@ -164,12 +165,12 @@ class Code:
     def _record_modes(self, at: Any, factor: Any, first: int, stride: int) -> None:
         """Write down the sum of all modes: σ11, σ22, σ33, σ12, and structure variables."""
         w, a = self._w, self._arithmetic
-        places = [w.at((at, self._size), (i, 1)) for i in range(self._size)]
+        places = [w.at((at, self.size), (i, 1)) for i in range(self.size)]
         for place in places:
             w.store(a.lanes(0.0), "of_modes", place)
         with w.loop(w.counts["modes"]) as number, a.apart():
             own = a.multiply(factor, self._tree("mode", self._of_mode, number).modulus[()])
-            stress = self._kept(w.at((number, stride), (first, 1)), self._size)
+            stress = self._kept(w.at((number, stride), (first, 1)), self.size)
             for value, place in zip(stress, places, strict=True):
                 more = a.multiply(own, value)
                 w.store(a.add(w.load("of_modes", place), more), "of_modes", place)

@@ -88,7 +88,7 @@ class Cycles:
         first: Any,
         has_states: Any,
     ):
-        self._code, self._levels, self._size = code, levels, (size := code._size)
+        self._code, self._levels, self._size = code, levels, (size := code.size)
         self._levels_at, self._modes_at = levels_at, modes_at
         self._count = sum(count for count, _ in levels)
         w = code._w

@@ -19,19 +19,16 @@ from discover.programs.lanes.arithmetic import INTEGER, TRUTH
 from discover.protocols.kinematics import Kinematics
 
 _COUNTS = ("runs", "steps", "modes", "tabled", "normal")
-# of all modes and lanes: rates, parameters, modes and the limit of each vector; and what is written
-_WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "of_modes", "scratch")
-_WHOLE = ("last", "held", "cycle", "flags", "goes_on")
-_SCALAR = ("width", "whole", "least", "period", "table", "flow", "jump", "weight", "recorded")
+# of all modes and lanes: rates, parameters and modes of each vector; and what is written
+_WIDE = ("rate", "shared", "mode", "stress", "felt", "of_modes", "scratch")
+_WHOLE = ("last", "held", "cycle", "flags", "taken")
+_SCALAR = ("width", "whole", "least", "period", "table", "flow", "jump")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
-
-# Where the number of steps stands, beside whether any vector is of use
-_STEPS = 1
 
 # Where in the scratch array what stands; the last few, and the modes behind them, are the state
 # that is carried from step to step
-_MISSED, _TAKEN, _SUM, _OTHER_SUM = range(4)
-_OWN = range(4, 4 + len(OWN))
+_TAKEN, _SUM, _OTHER_SUM = range(3)
+_OWN = range(3, 3 + len(OWN))
 _STATE = _OWN.stop
 _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
@@ -70,8 +67,8 @@ class Kernel(Code):
         used: np.ndarray,
         given: dict[str, np.ndarray],
         normal: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-        """Return stress and felt rate at step ends, the modes', and whether any vector is of use.
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return stress and felt rate at step ends, and the modes'.
 
         Shapes (runs, ends, lanes), NaN where none was computed; of the modes σ11, σ22, σ33, σ12
         and their structure variables, (runs, ends, s, lanes), empty unless `normal`. `tabled`:
@@ -79,39 +76,37 @@ class Kernel(Code):
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
-        felt, goes_on = np.zeros_like(stress), np.zeros(2, np.int64)
-        of_modes = np.full((*stress.shape[:2], self._size if normal else 0, LANES), np.nan)
+        felt, taken = np.zeros_like(stress), np.zeros(1, np.int64)
+        of_modes = np.full((*stress.shape[:2], self.size if normal else 0, LANES), np.nan)
         of_modes[:, 0] = 0.0
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
-        size = self._state_at + modes * self._size
+        size = self._state_at + modes * self.size
         # a step whose width is chosen holds the state three times
         room = _STATE + 3 * (size - _STATE)
-        room += Cycles.room(self._state_at - _LEVELS, modes, self._size) * self._begins
+        room += Cycles.room(self._state_at - _LEVELS, modes, self.size) * self._begins
         scratch = np.empty((room, LANES))
         arrays = given | {
-            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
+            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "taken": taken,
             "of_modes": of_modes,
         }  # fmt: skip
         self._run((runs, steps, modes, tabled, int(normal)), arrays)
-        self.steps_taken += int(goes_on[_STEPS])
-        return stress, felt, of_modes, bool(goes_on[0])
+        self.steps_taken += int(taken[0])
+        return stress, felt, of_modes
 
     def _body(self) -> None:
         w = self._w
         first = [w.load("shared", i) for i in range(self._shared.size)]
         self._parameters = self._shared.tree(first)
         self._on = self._truths()
-        self._keep(0.0, _MISSED)
         self._next = w.builder.alloca(INTEGER)
         levels, has_states = range(_LEVELS, self._state_at), self._on["states"]
         self._held = OwnWidths(self, _OWN, _STATE, levels, self._state_at, has_states)
         if self._begins:
-            of_modes = (w.counts["modes"], 3 * self._size)
+            of_modes = (w.counts["modes"], 3 * self.size)
             room = w.at(of_modes, (3, self._state_at - _STATE), (_STATE, 1))
             self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
-        w.store(INTEGER(1), "goes_on", 0)
-        with w.loop(w.counts["runs"], self._goes_on) as run, self._arithmetic.apart():
+        with w.loop(w.counts["runs"]) as run, self._arithmetic.apart():
             self._of_run(run)
 
     def _splat(self, name: str, place: Any) -> Any:
@@ -126,7 +121,7 @@ class Kernel(Code):
             self._keep(0.0, place)
         w.builder.store(INTEGER(0), self._next)
         self._rest(self._levels, _LEVELS)
-        states = w.at((counts["modes"], self._size))
+        states = w.at((counts["modes"], self.size))
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
         last = w.load("last", run)
@@ -140,15 +135,14 @@ class Kernel(Code):
                 self._steps(run, first, w.builder.sub(behind, first), flow, is_run)
         else:
             self._steps(run, INTEGER(0), last, flow, TRUTH(1))
-        with w.builder.if_then(self._goes_on()), self._arithmetic.apart():
-            self._at_start(run, flow)
-            with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
-                self._beside(run, number, flow)
+        self._at_start(run, flow)
+        with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
+            self._beside(run, number, flow)
 
     def _steps(self, run, first, count, flow, is_run) -> None:
         """Write so many steps, and what is recorded in them if they are the run's."""
         w, arithmetic = self._w, self._arithmetic
-        with w.loop(count, self._goes_on) as number, arithmetic.apart():
+        with w.loop(count) as number, arithmetic.apart():
             number = w.at((number, 1), (first, 1))
             if self._chooses:
                 is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
@@ -164,12 +158,12 @@ class Kernel(Code):
             self._keep(0.0, place)
         with w.loop(w.counts["modes"]) as number, self._arithmetic.apart():
             mode, at = self._tree("mode", self._of_mode, number), self._place_of_mode(number)
-            stress = self._kept(at, self._size)
+            stress = self._kept(at, self.size)
             sheared, _ = self._write(self._step.felt, mode, flow, stress)
             self._keep(add(self._kept(_SHEARED), sheared[()]), _SHEARED)
 
     def _place_of_mode(self, number) -> Any:
-        return self._w.at((number, self._size), (self._state_at, 1))
+        return self._w.at((number, self.size), (self._state_at, 1))
 
     def _of_grid(self, run, number, flow, is_run) -> None:
         """Write a step of the grid."""
@@ -178,7 +172,7 @@ class Kernel(Code):
         rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
         width = self._splat("width", w.at((run, steps), (number, 1)))
         self._of_step(run, number, flow, rates, width, TRUTH(0))
-        self._record(run, number, flow, rates[2], is_run)
+        self._record(run, number, is_run)
 
     def _of_interval(self, run, number, flow, is_run) -> None:
         """Write a step of the grid, or several in which the rate is a straight line."""
@@ -187,7 +181,6 @@ class Kernel(Code):
         rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
         count, is_held = self._held.steps(run, number, half)
         w.builder.store(w.at((number, 1), (count, 1)), self._next)
-        last = w.load("rate", w.at((half, 1), (count, 2)))
         first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
@@ -198,12 +191,12 @@ class Kernel(Code):
                     earlier, now = w.load("felt", first), self._kept(_EARLIER)
                     w.store(self._arithmetic.chosen(is_first, now, earlier), "felt", first)
         number = w.at((number, 1), (count, 1), (-1, 1))
-        self._record(run, number, flow, last, is_run)
+        self._record(run, number, is_run)
 
     def _of_step(self, run, number, flow, rates, width, is_held) -> None:
         w, counts, write, step = self._w, self._w.counts, self._write, self._step
         shared, on, add = self._parameters, self._on, self._arithmetic.add
-        w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
+        w.store(w.at((w.load("taken", 0), 1), (1, 1)), "taken", 0)
         levels, earlier = self._states(self._levels, _LEVELS), self._kept(_EARLIER)
         before, scale_last, slow = write(
             step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width
@@ -278,10 +271,10 @@ class Kernel(Code):
         on = {"own weights": own}
         weights = self._write(self._step.weights, mode, on, width, _array(table))
         at = self._place_of_mode(mode_number)
-        return mode, weights, self._kept(at, self._size), at
+        return mode, weights, self._kept(at, self.size), at
 
-    def _record(self, run, number, flow, rate, is_run) -> None:
-        """Write the run's stress down, and give up where no vector is of use any more."""
+    def _record(self, run, number, is_run) -> None:
+        """Write the run's stress down."""
         w, builder, a = self._w, self._w.builder, self._arithmetic
         with builder.if_then(is_run), a.apart():
             steps, recorded, taken = w.counts["steps"], self._kept(_RECORDED), self._kept(_EARLIER)
@@ -294,18 +287,7 @@ class Kernel(Code):
             ):
                 levels = self._states(self._levels, _LEVELS)
                 factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
-                self._record_modes(at, factor, self._state_at, self._size)
-            weight = w.load("weight", at)
-            with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
-                beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
-                off = a.subtract(a.add(recorded, beside), self._splat("recorded", at))
-                off = a.multiply(a.splat(weight), off)
-                missed = a.add(self._kept(_MISSED), a.multiply(off, off))
-                self._keep(missed, _MISSED)
-                limit = w.load("limit", 0)
-                # what is no number is below no limit
-                endless = a.compare("==", limit, float("inf"))
-                self._go_on_if(builder.or_(endless, a.compare("<", missed, limit)))
+                self._record_modes(at, factor, self._state_at, self.size)
 
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""

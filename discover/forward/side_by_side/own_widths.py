@@ -70,7 +70,7 @@ class OwnWidths:
         self._straight, self._left = (w.builder.alloca(INTEGER) for _ in range(2))
         self._at = dict(zip(OWN, at, strict=True))
         self._state, self._levels, self._modes = state, levels, modes
-        self._numbers = code._size
+        self._numbers = code.size
         self._size = w.at((w.counts["modes"], self._numbers), (modes - state, 1))
         # of an error of fifth order the halves have a fifteenth of what they differ by, of one of
         # third order a third

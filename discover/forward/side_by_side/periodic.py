@@ -88,7 +88,7 @@ class PeriodicCode(Code):
         self._back = mirror(variables - 4 * tensors, tensors)
         self._weights = (self._kinds, WEIGHTS) if self._kinds > 1 else (WEIGHTS,)
         self._way_at = _WEIGHTS + self._kinds * WEIGHTS
-        self._way_size = 3 * self._size + 3
+        self._way_size = 3 * self.size + 3
         self._now_at = self._way_at + self._way_size
         self._make(fluid, found)
 
@@ -102,7 +102,7 @@ class PeriodicCode(Code):
         storage, loss = np.empty((2, groups, LANES))
         arrays = given | {
             "flags": used.astype(np.int64), "storage": storage, "loss": loss,
-            "scratch": np.empty((self._now_at + self._size * (1 + self._size), LANES)),
+            "scratch": np.empty((self._now_at + self.size * (1 + self.size), LANES)),
             "goes_on": np.ones(1, np.int64),
         }  # fmt: skip
         self._run((groups, modes, given["cosine"].shape[1]), arrays)
@@ -122,7 +122,7 @@ class PeriodicCode(Code):
                 self._of_mode_alone(group, shared, mode, on)
 
     def _of_mode_alone(self, group, shared, mode, on) -> None:
-        w, write, a, size = self._w, self._write, self._arithmetic, self._size
+        w, write, a, size = self._w, self._write, self._arithmetic, self.size
         frequency, strain = w.load("frequency", group), w.load("strain", group)
         steps = a.splat(w.builder.sitofp(w.load("steps", group), a.lanes(0.0).type.element))
         width = a.divide(np.pi, a.multiply(steps, frequency))
@@ -160,7 +160,7 @@ class PeriodicCode(Code):
 
     def _harmonic(self, group, shared, mode, on, frequency, strain, steps) -> None:
         """Add the first harmonic of the half cycle that begins with what was found."""
-        w, write, a, size = self._w, self._write, self._arithmetic, self._size
+        w, write, a, size = self._w, self._write, self._arithmetic, self.size
         start = self._kept(self._way_at, size)
         self._keep(start, self._now_at)
         self._keep(0.0, _STORAGE)
@@ -244,7 +244,7 @@ class PeriodicSideBySide(StatePredictor):
         )
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials states 2"]:
-        """Return both moduli; limits say nothing here."""
+        """Return both moduli."""
         part, eights, count = asked.part, self._eights(asked), len(asked.thetas)
         frequency = np.asarray(part.frequency)
         rate = self._felt(asked, eights, frequency * np.asarray(part.strain))[:count]
@@ -311,27 +311,26 @@ class PeriodicSideBySide(StatePredictor):
         thetas[:, self._still] = 0.0
         width = np.repeat((2.0 * np.pi / (frequency * steps))[:, None], most, axis=1)
         phase = np.arange(2 * most + 1) * (np.pi / steps[:, None])
-        wave, none = frequency[:, None] * np.cos(phase), np.zeros((len(steps), most + 1))
+        wave = frequency[:, None] * np.cos(phase)
         # of what is periodic the sum over a period is exact to all orders
         ends = np.arange(1, most + 1) <= steps[:, None]
         harmonic = np.where(ends, 2j * np.exp(-1j * phase[:, 2::2]), 0.0) / steps[:, None]
         declared = len(asked.numbers.modulus)
 
-        def eight(lanes: np.ndarray, _, used: np.ndarray) -> np.ndarray:
+        def eight(lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
             packed = self._packed_last(asked.numbers, thetas[lanes], asked.moduli[lanes])
             modes, shared = (np.asarray(array) for array in packed)
             amplitude = strain[lanes].T
             given = {
                 "rate": wave[:, :, None] * amplitude[:, None], "shared": shared,
                 "mode": modes[modes_in_use(modes[:, 0].T, declared)],
-                "limit": np.full(LANES, np.inf), "table": np.zeros(WEIGHTS), "last": steps,
+                "table": np.zeros(WEIGHTS), "last": steps,
                 "held": np.ones(width.shape, np.int64),
                 "cycle": np.stack([np.zeros_like(steps), steps], axis=1),
                 "width": width, "whole": width, "least": width, "period": 2.0 * np.pi / frequency,
-                "jump": np.zeros(len(steps)), "flow": flows_of(None), "weight": none,
-                "recorded": none,
+                "jump": np.zeros(len(steps)), "flow": flows_of(None),
             }  # fmt: skip
-            _, _, of_modes, _ = self._cycles()(len(steps), 0, used, given, normal=True)
+            _, _, of_modes = self._cycles()(len(steps), 0, used, given, normal=True)
             stress = np.where(ends[:, :, None], of_modes[:, 1:, 3], 0.0)
             return (np.sum(harmonic[:, :, None] * stress, axis=1) / amplitude).T
 

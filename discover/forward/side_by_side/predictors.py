@@ -1,6 +1,7 @@
 """What is asked of many vectors of parameters at once, and how eights of lanes take it up."""
 
 from collections.abc import Callable, Iterable, Sequence
+from operator import is_
 from typing import Any, NamedTuple
 
 import jax
@@ -10,7 +11,6 @@ from jaxtyping import Bool, Float, Int
 from discover.effects import AbstractEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
-from discover.forward.records import Records
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.step import Flags
 from discover.programs import compiled, in_threads
@@ -20,25 +20,21 @@ from discover.programs.lanes import LANES
 class Asked(NamedTuple):
     """What is asked of vectors of parameters.
 
-    `moduli`: of the declared modes in Pa, the solvent's viscosity in Pa s last. `limits`: sums of
-    squared residuals from which on a vector is of no use. `part`, `judging`: runs of one control,
-    and what was recorded. `runs`: how many are no padding. `whole`: whether behind what is recorded
-    the stress without what distorts a signal is asked for, and the components of the modes.
+    `moduli`: of the declared modes in Pa, the solvent's viscosity in Pa s last. `part`: runs of one
+    control. `runs`: how many are no padding. `whole`: whether behind what is recorded the stress
+    without what distorts a signal is asked for, and the components of the modes.
     """
 
     numbers: Numbers
     thetas: Float[np.ndarray, "trials p"]
     moduli: Float[np.ndarray, "trials c"]
-    limits: Float[np.ndarray, " trials"]
     part: Any
-    judging: Records | None
     runs: int
     whole: bool
 
     def taken(self, which: np.ndarray) -> "Asked":
         """Return what is asked of some of the vectors."""
-        own = (of[which] for of in (self.thetas, self.moduli, self.limits))
-        return self._replace(**dict(zip(("thetas", "moduli", "limits"), own, strict=True)))
+        return self._replace(thetas=self.thetas[which], moduli=self.moduli[which])
 
 
 def in_whole_eights(count: int) -> Int[np.ndarray, " lanes"]:
@@ -64,6 +60,23 @@ def flows_of(kinematics: Any) -> Float[np.ndarray, "runs numbers"]:
     if not leaves:
         return np.zeros((1, 1))
     return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
+
+
+class MadeOnce:
+    """What is made of something, as parts of a batch, once for each of the `kept` last."""
+
+    def __init__(self, make: Callable[..., Any], kept: int = 8):
+        self._make, self._kept = make, kept
+        self._known: list[tuple[tuple, Any]] = []
+
+    def __call__(self, *given: Any) -> Any:
+        """Return what was made of these very objects."""
+        for known, made in self._known:
+            if len(known) == len(given) and all(map(is_, known, given)):
+                return made
+        made = self._make(*given)
+        self._known = [*self._known, (given, made)][-self._kept :]
+        return made
 
 
 class LanePredictor:
@@ -94,21 +107,19 @@ class LanePredictor:
         self,
         thetas: Float[np.ndarray, "trials p"],
         keys: Sequence[np.ndarray],
-        of_eight: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+        of_eight: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> np.ndarray:
         """Return what is found of vectors, eights of which are computed together.
 
         Those that need the same parts of the code, and agree in `keys`, go together. `of_eight`: of
-        eight vectors, the last again until there are eight, which are different, and the parts they
-        need.
+        eight vectors, the last again until there are eight, and the parts they need.
         """
         flags = self._flags.of(thetas)
         order = np.lexsort([*keys, *np.packbits(flags, axis=1).T])
 
         def found(trials: np.ndarray) -> np.ndarray:
-            different = np.arange(LANES) < len(trials)
             lanes = trials[in_whole_eights(len(trials))]
-            return of_eight(lanes, different, np.any(flags[trials], axis=0))[different]
+            return of_eight(lanes, np.any(flags[trials], axis=0))[: len(trials)]
 
         # to compile is behind a lock, so that no first call is needed alone
         eights = np.split(order, range(LANES, len(order), LANES))

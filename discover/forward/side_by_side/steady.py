@@ -39,8 +39,7 @@ _ARRAYS = (*_WIDE, *_WHOLE)
 # Where in the scratch array what stands that is carried from step to step; of each mode its state,
 # and behind that the number of its next step and how many were taken again
 _FELT, _INDEX, _ALIVE, _SUM, _MOVING = range(5)
-_TOTAL = range(5, 9)
-_LEVELS = _TOTAL.stop
+_TOTAL = 5
 
 
 class SteadyStep(Step):
@@ -104,16 +103,16 @@ class SteadyStep(Step):
         return where_in_shear(flow, jnp.asarray(sum(slip for slip, _ in pairs)), jnp.zeros(()))
 
     def reached(self, shared, mode, on, flow, levels, felt, rate, way):
-        """Return σ11, σ22, σ33, σ12 of a mode in Pa; not a number where it is not steady."""
+        """Return a mode in Pa; not a number where it is not steady."""
         slow = self._factor("time_factor", shared, on, levels)
         change, weissenberg = self._of_way(shared, mode, on, flow, slow, felt, rate)
         end = arrived(change, Approach(way[:-2, None], way[-2:-1], way[-1:]), weissenberg)
-        return mode.modulus * end[:4, 0]
+        return mode.modulus * end[:, 0]
 
     def recorded(self, shared, on, flow, levels, felt, of_modes):
         """Return the recorded stress with what stands beside the modes, and that of all modes."""
         of_modes = self._factor("modulus_factor", shared, on, levels) * of_modes
-        recorded = of_modes[3] if flow is None else contracted(flow.recorded, of_modes)
+        recorded = of_modes[3] if flow is None else contracted(flow.recorded, of_modes[:4])
         return recorded + self.beside(shared, on, flow, felt), of_modes
 
 
@@ -125,21 +124,24 @@ class SteadyCode(Code):
     def __init__(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None):
         super().__init__(fluid, found, flow)
         # of a mode, and the two numbers of its way
-        self._numbers = 4 + self._law.variables + 2
+        self._numbers = self.size + 2
         states = [effect for effect in fluid.states if effect.acts_on_steady_states]
         self._step = SteadyStep(fluid, self._plain_law, states)
         self._levels = [(effect.levels, effect.rest) for effect in states]
-        self._modes_at = _LEVELS + sum(levels for levels, _ in self._levels)
+        self._levels_at = _TOTAL + self.size
+        self._modes_at = self._levels_at + sum(levels for levels, _ in self._levels)
         self._make(fluid, found, flow)
 
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
         """Return recorded stress before the signal, felt rate, and the modes' stress.
 
-        The first two have the shape (groups, lanes), the last is σ11, σ22, σ33, σ12, shape (groups,
-        4, lanes). `given`: rates, modes, what these share, and flows, groups first and lanes last.
+        The first two have the shape (groups, lanes), the last is σ11, σ22, σ33, σ12 and structure
+        variables, shape (groups, s, lanes). `given`: rates, modes, what these share, and flows,
+        groups first and lanes last.
         """
         groups, modes = given["mode"].shape[:2]
-        (stress, felt), of_modes = np.empty((2, groups, LANES)), np.empty((groups, 4, LANES))
+        stress, felt = np.empty((2, groups, LANES))
+        of_modes = np.empty((groups, self.size, LANES))
         arrays = given | {
             "flags": used.astype(np.int64), "stress": stress, "felt": felt, "of_modes": of_modes,
             "scratch": np.empty((self._modes_at + modes * self._numbers, LANES)),
@@ -162,12 +164,12 @@ class SteadyCode(Code):
         self._keep(rate, _FELT)
         self._keep(0.0, _INDEX)
         self._keep(1.0, _ALIVE)
-        self._rest(self._levels, _LEVELS)
+        self._rest(self._levels, self._levels_at)
         with w.loop(w.at((modes, self._numbers))) as number:
             self._keep(0.0, w.at((number, 1), (self._modes_at, 1)))
         w.store(INTEGER(1), "goes_on", 0)
         with w.loop(MOST_STEPS, self._goes_on), a.apart():
-            levels = self._states(self._levels, _LEVELS)
+            levels = self._states(self._levels, self._levels_at)
             felt, index, alive = (self._kept(place) for place in (_FELT, _INDEX, _ALIVE))
             self._keep(np.zeros(2), _SUM)
             with w.loop(modes) as number, a.apart():
@@ -182,23 +184,23 @@ class SteadyCode(Code):
                 step.beside_modes, shared, on, flow, levels, felt, rate, self._kept(_SUM), alive
             )
             self._keep(felt, _FELT)
-            self._keep_states(after, _LEVELS)
+            self._keep_states(after, self._levels_at)
             alive = a.multiply(alive, a.larger(self._kept(_MOVING), moving[()]))
             self._keep(alive, _ALIVE)
             self._keep(a.add(index, 1.0), _INDEX)
             self._go_on_if(a.compare(">", alive, 0.0))
-        levels, felt = self._states(self._levels, _LEVELS), self._kept(_FELT)
-        self._keep(np.zeros(len(_TOTAL)), _TOTAL.start)
+        levels, felt = self._states(self._levels, self._levels_at), self._kept(_FELT)
+        self._keep(np.zeros(self.size), _TOTAL)
         with w.loop(modes) as number, a.apart():
             mode, way, _ = self._mode(group, number)
             found = write(step.reached, shared, mode, on, flow, levels, felt, rate, way)
-            for place, value in zip(_TOTAL, found, strict=True):
+            for place, value in enumerate(found, _TOTAL):
                 self._keep(a.add(self._kept(place), value), place)
-        total = self._kept(_TOTAL.start, len(_TOTAL))
+        total = self._kept(_TOTAL, self.size)
         stress, of_modes = write(step.recorded, shared, on, flow, levels, felt, total)
         w.store(a.lanes(stress[()]), "stress", group)
         for i, value in enumerate(of_modes):
-            w.store(a.lanes(value), "of_modes", w.at((group, 4), (i, 1)))
+            w.store(a.lanes(value), "of_modes", w.at((group, self.size), (i, 1)))
         w.store(felt, "felt", group)
 
     def _mode(self, group, number):
@@ -236,7 +238,7 @@ class SteadySideBySide(StatePredictor):
         self._recorded = self._program("steady records", recorded, *axes)
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded, see `Asked.whole`; limits say nothing here."""
+        """Return what is recorded, see `Asked.whole`."""
         thetas, part, eights = asked.thetas, asked.part, self._eights(asked)
         rate = self._felt(asked, eights, np.asarray(part.rate))
         found = self._states(thetas, eights, len(asked.numbers.modulus), rate, part)
@@ -253,7 +255,7 @@ class SteadySideBySide(StatePredictor):
         return np.concatenate([stress[..., None], *beside], axis=-1)
 
     def _states(self, thetas, eights: Eights, declared: int, rate, part) -> np.ndarray:
-        """Return stresses, felt rates and those of the modes, shape (trials, runs, n, 6)."""
+        """Return stresses, felt rates and the modes', shape (trials, runs, n, 2 + s)."""
         own = np.asarray(part.rate)
         # behind the last there are copies of it
         changes = np.diff(own, axis=1) != 0.0
@@ -262,7 +264,7 @@ class SteadySideBySide(StatePredictor):
         place = np.minimum(np.arange(own.shape[1]), last[:, None])
         of_run, at = np.nonzero(np.arange(own.shape[1]) <= last[:, None])
         flows = flows_of(part.kinematics)
-        out = np.empty((len(thetas), *own.shape, 6))
+        out = np.empty((len(thetas), *own.shape, 2 + self._code.size))
 
         def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             row, column = of_run[state], at[state]
@@ -272,7 +274,7 @@ class SteadySideBySide(StatePredictor):
             }
             stress, felt, of_modes = self._code(used, given)
             found = np.concatenate([stress[:, None], felt[:, None], of_modes], axis=1)
-            out[trial, row, column] = np.moveaxis(found, 1, -1).reshape(-1, 6)
+            out[trial, row, column] = np.moveaxis(found, 1, -1).reshape(-1, out.shape[-1])
 
         self._by_states(thetas, [np.arange(len(of_run))], _AT_ONCE, solve)
         return np.take_along_axis(out, place[None, :, :, None], axis=2)

@@ -116,7 +116,7 @@ class StressCode(Code):
         kinds, kept = self._kinds, StressStep.kept
         self._weights = (kinds, kept) if kinds > 1 else (kept,)
         # of a mode: before and after the step, and its weights
-        self._numbers = 2 * self._size + kinds * kept
+        self._numbers = 2 * self.size + kinds * kept
         self._modes_at = _LEVELS + sum(levels for levels, _ in self._levels)
         self._make(fluid, found, flow)
 
@@ -129,7 +129,7 @@ class StressCode(Code):
         """
         (runs, steps), modes = given["width"].shape, len(given["mode"])
         strain = np.full((runs, steps + 1, LANES), np.nan)
-        of_modes = np.full((runs, steps + 1, self._size if normal else 0, LANES), np.nan)
+        of_modes = np.full((runs, steps + 1, self.size if normal else 0, LANES), np.nan)
         strain[:, 0], of_modes[:, 0] = 0.0, 0.0
         arrays = given | {
             "flags": used.astype(np.int64), "strain": strain, "of_modes": of_modes,
@@ -172,9 +172,9 @@ class StressCode(Code):
         with w.loop(w.counts["modes"]) as mode_number, a.apart():
             mode, at = self._mode(mode_number)
             own = write(step.weights, mode, on, a.divide(width, slow[()]), np.zeros(step.kept))
-            self._keep(own, w.at((at, 1), (2 * self._size, 1)))
+            self._keep(own, w.at((at, 1), (2 * self.size, 1)))
             felt, slopes = write(
-                step.stiff, shared, mode, on, flow, slow, self._kept(at, self._size),
+                step.stiff, shared, mode, on, flow, slow, self._kept(at, self.size),
                 self._kept(_RATES, 2), own,
             )  # fmt: skip
             self._add([*felt.flat, *slopes.flat], _FELT)
@@ -201,7 +201,7 @@ class StressCode(Code):
         self._keep_states(after, _LEVELS)
         with w.loop(w.counts["modes"]) as mode_number, a.apart():
             _, at = self._mode(mode_number)
-            self._keep(self._kept(w.at((at, 1), (self._size, 1)), self._size), at)
+            self._keep(self._kept(w.at((at, 1), (self.size, 1)), self.size), at)
         w.store(self._kept(_STRAIN), "strain", end)
         asked = w.builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))
         with w.builder.if_then(asked), a.apart():
@@ -218,10 +218,10 @@ class StressCode(Code):
             mode, at = self._mode(mode_number)
             felt, after = write(
                 step.answered, self._parameters, mode, self._on, flow, slow,
-                self._kept(at, self._size), self._kept(_RATES, 2),
-                self._kept(w.at((at, 1), (2 * self._size, 1)), *self._weights),
+                self._kept(at, self.size), self._kept(_RATES, 2),
+                self._kept(w.at((at, 1), (2 * self.size, 1)), *self._weights),
             )  # fmt: skip
-            self._keep(after, w.at((at, 1), (self._size, 1)))
+            self._keep(after, w.at((at, 1), (self.size, 1)))
             self._add(felt, _FELT)
             sheared, _ = write(step.felt, mode, flow, after)
             self._add(sheared, _SHEARED)
@@ -251,9 +251,9 @@ class StressSideBySide(LanePredictor):
         self._driven = self._program("driven", driven, (None, 0), (0, None))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return strains, see `Asked.whole`; limits say nothing here."""
+        """Return strains, see `Asked.whole`."""
         return self._by_eights(
-            asked.thetas, (), lambda lanes, _, used: self._eight(asked, lanes, used)
+            asked.thetas, (), lambda lanes, used: self._eight(asked, lanes, used)
         )
 
     def _eight(self, asked: Asked, lanes: np.ndarray, used: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -17,17 +18,20 @@ from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
 from discover.forward.exponential_weights import krogstad_weights
 from discover.forward.flows import TransientFlows
-from discover.forward.records import Records
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
+from discover.forward.side_by_side.predictors import (
+    Asked,
+    LanePredictor,
+    MadeOnce,
+    flows_of,
+    modes_in_use,
+)
 from discover.forward.side_by_side.step import WEIGHTS
+from discover.programs import on_device
 from discover.programs.lanes import LANES
 
 # Vectors of the same times from which on weights of the steps are worth a table
 _MANY = 8
-
-# Of the runs that were laid out for the kernel
-_KEPT = 8
 
 # Steps of the grid from which on vectors choose their own, and as how many of them a step may
 # always be long: two halves, extrapolated, err no more than two steps of the grid
@@ -37,8 +41,7 @@ _FEWEST, _ALWAYS = 8, 2.0
 JUMP = 1e-9
 
 _OF_RUNS = (
-    "last", "held", "cycle", "width", "whole", "least", "period", "jump", "flow", "weight",
-    "recorded",
+    "last", "held", "cycle", "width", "whole", "least", "period", "jump", "flow",
 )  # fmt: skip
 
 
@@ -57,13 +60,18 @@ class _Signals(NamedTuple):
     steps: None = None
 
     @classmethod
-    def of(cls, part: TransientFlows, runs: int) -> "_Signals":
-        """Return the first runs."""
-        of_time = (part.times, part.commanded_rate)
-        times, rate = (np.asarray(of)[:runs] for of in of_time)
-        of_run = (part.clock_factor, part.strain_before)
-        clock, strain = (np.asarray(of)[:runs, None] for of in of_run)
-        return cls(times, rate, clock, strain, np.asarray(part.sample_index)[:runs])
+    def of(cls, part: TransientFlows) -> "_Signals":
+        """Return all runs of a part."""
+        times, rate, sample, clock, strain = map(
+            np.asarray,
+            (part.times, part.commanded_rate, part.sample_index, part.clock_factor,
+             part.strain_before),
+        )  # fmt: skip
+        return cls(times, rate, clock[:, None], strain[:, None], sample)
+
+    def of_first(self, runs: int) -> "_Signals":
+        """Return the first runs, which are no padding."""
+        return _Signals(*(of if of is None else of[:runs] for of in self))
 
 
 def _takes_numpy(effect: KinematicEffect | SignalEffect) -> bool:
@@ -85,7 +93,6 @@ class _Runs(NamedTuple):
         line, how long these are, and how short a vector's own may be, in s; see `OwnWidths`.
     `cycle`, `period`: steps between which the cycle lies that a run's start brings back, the first
         negative where there is none, and its length in s.
-    `weight`, `recorded`: what was measured, at step ends.
     `rate`, `tool_rate`: without effects of the instrument, lanes of the former last, of the latter
         first.
     """
@@ -99,9 +106,7 @@ class _Runs(NamedTuple):
     least: np.ndarray
     jump: np.ndarray
     flow: np.ndarray  # kinematics of each run
-    signals: _Signals  # what effects on rates and signals take, of runs that are no padding
-    weight: np.ndarray
-    recorded: np.ndarray
+    signals: _Signals  # what effects on rates and signals take
     rate: np.ndarray
     tool_rate: np.ndarray
     in_shear: bool
@@ -153,6 +158,41 @@ def _between(
     )
 
 
+def _runs(part: TransientFlows) -> _Runs:
+    """Return runs as the kernel takes them."""
+    # as commanded, where no instant at which it steps is fitted
+    commanded = np.asarray(part.commanded_rate)
+    rate = np.repeat(commanded[..., None], LANES, axis=-1)
+    tool_rate = np.tile(commanded[:, ::2], (LANES, 1, 1))
+    times = np.asarray(part.times)[:, ::2]
+    last = np.asarray(part.last_step)
+    held, whole, least = intervals(part)
+    flow = part.kinematics
+    cycle = np.asarray(part.cycle).astype(np.int64)
+    ends = np.take_along_axis(times, np.maximum(cycle, 0), axis=1)
+    return _Runs(
+        # one step more than its samples need, since effects of the signal look at its rate
+        np.minimum(last + 1, np.max(last)).astype(np.int64),
+        cycle,
+        np.where(cycle[:, 0] < 0, 1.0, np.diff(ends, axis=1)[:, 0]),
+        held,
+        np.diff(times),
+        whole,
+        least,
+        JUMP * times[:, -1],
+        flows_of(part.kinematics),
+        _Signals.of(part),
+        rate,
+        tool_rate,
+        flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
+    )
+
+
+def _placed(part: TransientFlows) -> TransientFlows:
+    """Return runs as JAX holds them, so that they are handed over once."""
+    return jax.tree.map(on_device, part)
+
+
 class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
@@ -186,7 +226,7 @@ class SideBySide(LanePredictor):
         self._rates = self._program("rates", rates, *axes, vectors_to=(-1, 0))
         axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
         self._recorded = self._program("recorded", recorded, *axes)
-        self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
+        self._runs, self._placed = MadeOnce(_runs), MadeOnce(_placed)
         self._known_table: tuple | None = None
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
@@ -194,15 +234,10 @@ class SideBySide(LanePredictor):
         times, counts = np.unique(asked.thetas[:, 1], return_counts=True)
         most = int(np.argmax(counts))
         table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
-        assert asked.judging is not None  # of transients there always is
-        laid_out = self._runs(asked.part, asked.judging, asked.runs)
+        laid_out = self._runs(asked.part)
 
-        def eight(lanes: np.ndarray, different: np.ndarray, used: np.ndarray) -> np.ndarray:
-            limits = np.where(different, asked.limits[lanes], -np.inf)
-            own = asked._replace(
-                thetas=asked.thetas[lanes], moduli=asked.moduli[lanes], limits=limits
-            )
-            return self._eight(own, laid_out, used, table)
+        def eight(lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
+            return self._eight(asked.taken(lanes), laid_out, used, table)
 
         return self._by_eights(asked.thetas, [asked.thetas[:, 1]], eight)
 
@@ -228,13 +263,11 @@ class SideBySide(LanePredictor):
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
         given = {
-            "rate": rate, "shared": shared, "mode": modes, "limit": asked.limits,
-            "table": tabled, **{name: getattr(laid_out, name) for name in _OF_RUNS},
+            "rate": rate, "shared": shared, "mode": modes, "table": tabled,
+            **{name: getattr(laid_out, name) for name in _OF_RUNS},
         }  # fmt: skip
-        stress, felt, of_modes, goes_on = self._code(runs, declared, used, given, asked.whole)
-        if not goes_on:
-            stress[:] = np.nan
-        places = np.arange(runs)[:, None], laid_out.signals.sample
+        stress, felt, of_modes = self._code(runs, declared, used, given, asked.whole)
+        places = np.arange(runs)[:, None], laid_out.signals.sample[:runs]
         at_samples, beside = stress[places], []
         if asked.whole:
             own = (at_samples[:, :, None], of_modes[places])
@@ -246,10 +279,9 @@ class SideBySide(LanePredictor):
             given["held"] = np.ones_like(laid_out.held)
             stress, felt, *_ = self._code(runs, declared, used, given)
             stress[:runs] += _between(at_samples - stress[places], part)
-        laid = len(rate)
-        beyond = np.arange(stress.shape[1]) > laid_out.last[:laid, None]
-        felt[:laid][beyond], stress[:laid][beyond] = rate[:, ::2][beyond], 0.0
-        signals = laid_out.signals
+        beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
+        felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
+        signals = laid_out.signals.of_first(runs)
         found = self._at_samples(thetas, part, signals, stress, felt, tool_rate)
         return np.concatenate([found[..., None], *beside], axis=-1)
 
@@ -263,7 +295,7 @@ class SideBySide(LanePredictor):
         """Return the felt rate, lanes last, and the tool's, lanes first."""
         present = self._fluid.present(thetas)
         if not self._is_plain(thetas, part):
-            felt, of_tool = self._rates(thetas, present, part)
+            felt, of_tool = self._rates(thetas, present, self._placed(part))
             return np.asarray(felt), np.asarray(of_tool)
         found = self._in_numpy[0](_before_runs(thetas), present, signals)
         felt, of_tool = (np.broadcast_to(of, (LANES, *of.shape[-2:])) for of in found)
@@ -275,7 +307,7 @@ class SideBySide(LanePredictor):
         """Return what samples record, of stress and felt rate at ends, lanes last."""
         present, runs = self._fluid.present(thetas), len(signals.times)
         if not self._is_plain(thetas, part):
-            found = self._recorded(thetas, present, part, stress, felt, of_tool)
+            found = self._recorded(thetas, present, self._placed(part), stress, felt, of_tool)
             return np.asarray(found)[:, :runs]
         given = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
         with np.errstate(all="ignore"):  # of a vector that runs away
@@ -283,47 +315,6 @@ class SideBySide(LanePredictor):
                 _before_runs(thetas), present, signals, *given, of_tool[:, :runs]
             )
         return found[:, np.arange(runs)[:, None], signals.sample]
-
-    def _runs(self, part: TransientFlows, judging: Records, runs: int) -> _Runs:
-        """Return runs as the kernel takes them, laid out once."""
-        for known, by, found in self._known_runs:
-            if known is part and by is judging:
-                return found
-        # as commanded, where no instant at which it steps is fitted
-        commanded = np.asarray(part.commanded_rate)
-        rate = np.repeat(commanded[..., None], LANES, axis=-1)
-        tool_rate = np.tile(commanded[:, ::2], (LANES, 1, 1))
-        times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
-        weight, recorded = np.zeros(times.shape), np.zeros(times.shape)
-        places = (np.arange(len(times))[:, None], sample)
-        np.add.at(weight, places, np.asarray(judging.weight))
-        np.add.at(recorded, places, np.asarray(judging.recorded))
-        last = np.asarray(part.last_step)
-        held, whole, least = intervals(part)
-        flow = part.kinematics
-        cycle = np.asarray(part.cycle).astype(np.int64)
-        ends = np.take_along_axis(times, np.maximum(cycle, 0), axis=1)
-        found = _Runs(
-            # one step more than its samples need, since effects of the signal look at its rate
-            np.minimum(last + 1, np.max(last)).astype(np.int64),
-            cycle,
-            np.where(cycle[:, 0] < 0, 1.0, np.diff(ends, axis=1)[:, 0]),
-            held,
-            np.diff(times),
-            whole,
-            least,
-            JUMP * times[:, -1],
-            flows_of(part.kinematics),
-            _Signals.of(part, runs),
-            weight,
-            recorded,
-            rate,
-            tool_rate,
-            flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
-        )
-        self._known_runs.append((part, judging, found))
-        del self._known_runs[:-_KEPT]
-        return found
 
     def _table(
         self, numbers: Numbers, part: TransientFlows, time: float, count: int

@@ -17,7 +17,6 @@ from discover.plain_numbers import json_text
 from discover.protocols.kinematics import in_words
 from discover.report.comparison import tables
 from discover.report.comparison.tables import learner_lines
-from discover.report.overlay import Overlay
 from discover.report.page import Missing, answer_screen, attempt, made_by, render, safe_name
 from discover.report.plots.comparison.flows import flow_picture, start_up_picture, training_picture
 from discover.report.plots.comparison.selection import (
@@ -25,9 +24,7 @@ from discover.report.plots.comparison.selection import (
     high_deborah_picture,
     loss_picture,
     selection_picture,
-    sweep_picture,
 )
-from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.style import Picture
 from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
 from discover.study.run_folder import RunFolder
@@ -36,25 +33,21 @@ from discover.words import estimate, interval, readable
 Drawn = Picture | Missing
 
 
-def comparison_pictures(
-    comparison: Comparison, overlays: Sequence[Overlay]
-) -> tuple[list[Drawn], list[Drawn]]:
+def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn]]:
     """Return the pictures of what was found, and those of training."""
     sparse = comparison.outcomes.get("tensor_sindy")
     details = {} if sparse is None else sparse.details
     found: list[tuple[str, Callable[[], Picture | None]]] = []
     for flow in comparison.judged:
         draw = flow_picture if flow.oscillatory else start_up_picture
-        found.append((f"The picture of {flow.title}", partial(draw, comparison, flow, overlays)))
+        found.append((f"The picture of {flow.title}", partial(draw, comparison, flow)))
     runs = ("The picture of the training runs", partial(training_picture, comparison))
     if not comparison.judged:  # what was fitted is then all that shows a law at work
         found.append(runs)
     found += [
         ("The map of errors", partial(error_map_picture, comparison)),
-        ("The map of residuals", partial(comparison_residual_map, comparison)),
         ("The picture of the selection", partial(selection_picture, details)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
-        ("The picture of the sweep", partial(sweep_picture, comparison)),
     ]
     loss = ("The picture of the loss", partial(loss_picture, comparison))
     return _drawn(found), _drawn([runs, loss] if comparison.judged else [loss])
@@ -191,7 +184,7 @@ def _outline(
     def laws() -> Content:
         outcomes = comparison.outcomes.values()
         drawn = [
-            tables.law(outcome, linear_relaxation, comparison.known_part_of(outcome.learner))
+            tables.law(outcome, linear_relaxation, comparison.known_or_maxwell)
             for outcome in outcomes
         ]
         return {"laws": drawn, "standing": _STANDING[comparison.verdict]}
@@ -270,13 +263,6 @@ def _outline(
         ("next", "What to measure next", "What to measure next"): [
             ("The table of experiments", "next", table("tests", tables.next_rows))
         ],
-        ("distillation", "Distillation: what a simpler law learns from this one", ""): [
-            (
-                "The table of distillations",
-                "distillation",
-                table("distillations", tables.distillations),
-            )
-        ],
         ("structure", "What these flows could tell of any law in the library", ""): [
             ("What the flows could tell", "structure", table("structure", tables.structure))
         ],
@@ -292,7 +278,6 @@ def write_comparison(
     linear_relaxation: bool,
     study_text: str = "",
     run: dict | None = None,
-    overlays: Sequence[Overlay] = (),
 ) -> Path:
     """Write ``comparison.json``, ``predictions.csv``, ``equations.tex``, the figures and the page.
 
@@ -301,15 +286,14 @@ def write_comparison(
 
     `linear_relaxation`: whether −σ was part of the known law. `study_text`: the study file, shown
     at the end. `run`: what the page says of the run that made it, where that was no command.
-    `overlays`: curves that the study asks for in addition to the learners'.
 
     Returns the page.
     """
     content = json_text(comparison.to_json())
     folder.write("comparison.json", content)
-    predictions = write_predictions(comparison_predictions(comparison, overlays), folder)
+    predictions = write_predictions(comparison_predictions(comparison), folder)
     folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
-    pictures, training = comparison_pictures(comparison, overlays)
+    pictures, training = comparison_pictures(comparison)
     for drawn in (*pictures, *training):
         if isinstance(drawn, Picture):
             folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
@@ -338,7 +322,7 @@ def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     """Return ``equations.tex``: the law that each learner found, with the known part below it."""
     parts = [PREAMBLE]
     for name, outcome in comparison.outcomes.items():
-        known = comparison.known_part_of(name)
+        known = comparison.known_or_maxwell
         terms = (*known.terms, *outcome.terms)
         named, note = known.named, ""
         if named is not None and not named.is_written:

@@ -11,7 +11,6 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
 from discover.equations.spelling.markup import law_element, term_element, term_mathml
-from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
@@ -238,24 +237,6 @@ _MOST_TESTS = 6
 def titles(comparison: Comparison) -> dict[str, str]:
     """Return the flows in the field's notation, by their names."""
     return {flow.name: flow.title for flow in comparison.flows}
-
-
-def distillations(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return what simpler laws learn from the true one."""
-
-    def values(parameters: Mapping[str, float]) -> str:
-        return ", ".join(f"{readable(k)} = {significant(v)}" for k, v in parameters.items())
-
-    return [
-        {
-            "teacher": LAWS[row["teacher"]].title,
-            "student": LAWS[row["student"]].title,
-            "penalised": values(row["penalised"]),
-            "debiased": values(row["debiased"]),
-            "misfit": row["misfit"],
-        }
-        for row in comparison.distillations
-    ]
 
 
 def structure(comparison: Comparison) -> dict[str, Any] | None:

@@ -1,6 +1,5 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from discover.loop.loop_result import LoopResult
@@ -8,14 +7,10 @@ from discover.plain_numbers import json_text
 from discover.protocols.kinematics import in_words
 from discover.report.loop import tables
 from discover.report.loop.tables import loop_verdict
-from discover.report.overlay import Overlay
 from discover.report.page import answer_screen, made_by, render, safe_name
-from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.loop.residual import (
-    ranking_picture,
-    reading_picture,
+    by_mode_picture,
     residual_picture,
-    run_error_picture,
     waterfall_picture,
 )
 from discover.report.plots.loop.runs import (
@@ -24,10 +19,8 @@ from discover.report.plots.loop.runs import (
     free_form_picture,
     lissajous_picture,
     next_test_picture,
-    rivals_picture,
     runs_picture,
 )
-from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.wording import SMALL_FAULTS
 from discover.study.run_folder import RunFolder
@@ -41,28 +34,21 @@ def write_loop(
     study_text: str = "",
     run: dict | None = None,
     conditions: str = "",
-    overlays: Sequence[Overlay] = (),
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
     `name`, `summary`: title, and the data and declared model in words. `study_text`: the study
     file, shown at the end. `run`: what the page says of the run that made it, where that was no
-    command. `conditions`: material and temperature, for the title. `overlays`: curves that the
-    study asks for in addition to the models.
+    command. `conditions`: material and temperature, for the title.
 
     Returns the page.
     """
     pictures = [
         waterfall_picture(result),
-        runs_picture(result, overlays),
-        lissajous_picture(result, overlays),
+        runs_picture(result),
+        lissajous_picture(result),
         free_form_picture(result),
-        loop_residual_map(result),
         residual_picture(result),
-        rivals_picture(result),
-        reading_picture(result),
-        run_error_picture(result),
-        ranking_picture(result),
         by_mode_picture(result.by_mode, result.verdict == "unexplained"),
         next_test_picture(result),
     ]
@@ -72,7 +58,7 @@ def write_loop(
     content = json_text(result.to_json())
     folder.write("loop.json", content)
     folder.write("equations.tex", loop_tex(result))
-    predictions = write_predictions(loop_predictions(result, overlays), folder)
+    predictions = write_predictions(loop_predictions(result), folder)
     page = render(
         "loop.html",
         data={PREDICTIONS: predictions, "loop.json": content},
@@ -82,8 +68,7 @@ def write_loop(
         result=result,
         screen=answer_screen(result.answer),
         sentences=loop_verdict(result),
-        error_rows=tables.error_rows(result)
-        + [tables.overlay_row(result, one) for one in overlays],
+        error_rows=tables.error_rows(result),
         recorded=in_words(record.quantity for record in result.records),
         noise_range=tables.noise_range(result),
         run_rows=tables.run_rows(result),

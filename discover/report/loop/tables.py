@@ -13,9 +13,7 @@ from discover.loop.parts import CandidateScore, Fold, LawFit, Stage
 from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.mathtext import formula
-from discover.report.overlay import Overlay
 from discover.report.page import safe_name
-from discover.report.plots.loop.residual import MOST_RANKED
 from discover.report.wording import free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
@@ -142,22 +140,6 @@ def _what_tests_it(result: LoopResult) -> Iterator[str]:
     if doubted(result) is not None:
         none = percent(result.explanations.unexplained_probability)
         yield f"probability that no candidate is right: {none}"
-
-
-def overlay_row(result: LoopResult, overlay: Overlay) -> dict[str, Any]:
-    """Return the mean error of an overlay where it covers a run."""
-    row: dict[str, Any] = {"model": f"overlay: {overlay.label}"}
-    for name, held_out in (("fit", False), ("held_out", True)):
-        errors = [
-            float(np.sqrt(np.mean((curve - r.measured) ** 2) / np.mean(r.measured**2)))
-            for r in result.records
-            if r.held_out is held_out
-            and (curve := overlay.of(r.name, r.quantity)) is not None
-            and np.all(np.isfinite(curve))
-            and np.any(r.measured)
-        ]
-        row |= {name: float(np.mean(errors)) if errors else None, f"{name}_range": errors}
-    return row
 
 
 def error_rows(result: LoopResult) -> list[dict[str, Any]]:
@@ -327,6 +309,10 @@ def fold_row(fold: Fold) -> dict[str, Any]:
         "error_after": fold.error_after,
         "effects": ", ".join(map(effect_title, fold.effects)) or "none",
     }
+
+
+MOST_RANKED = 12
+"""Candidates of a stage that are shown, the best."""
 
 
 def ranking_rows(ranking: Sequence[CandidateScore]) -> list[dict[str, Any]]:

@@ -1,13 +1,13 @@
 """Pictures of a data folder as it was read: every test, and how tests agree with one another."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.ticker import EngFormatter
 
 from discover.dataset.dataset import Dataset
-from discover.dataset.linear.linear_tests import CREEP, RELAXATION, SWEEP
 from discover.dataset.linear.superposition import Superposition
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
@@ -18,6 +18,8 @@ from discover.report.plots.style import (
     GREEN,
     NETWORK,
     SPARSE,
+    Curve,
+    Panel,
     Picture,
     figure,
     label_rows,
@@ -26,6 +28,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     panels_of,
     picture,
+    row_of_panels,
     runs_through_decades,
 )
 from discover.report.wording import percent
@@ -35,7 +38,7 @@ from discover.words import FIGURE_SYMBOLS, counted
 _MOST_RUNS = 24
 """Panels of runs, beyond which a page is too long to look through."""
 
-_POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.9}
+_POINTS: dict[str, Any] = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.9}
 _MOST_POINTS = 300
 
 
@@ -102,111 +105,99 @@ def _draw_run(panel, run: Run) -> None:
     panel.set_title(f"{literal(shortened(run.name))}\n{run_line(run)['flow']}", fontsize=8)
 
 
-def _moduli(panel, along, storage, loss, suffix: str = "", **style) -> None:
-    for symbol, values, marker, colour in (
-        ("G′", storage, "o", NETWORK),
-        ("G″", loss, "s", SPARSE),
-    ):
-        panel.plot(along, values, color=colour, marker=marker, label=symbol + suffix, **style)
+_LOGARITHMIC = {"xscale": "log", "yscale": "log"}
+_DOTTED = {"lw": 0.8, "ls": ":"}
+
+
+def _moduli(along, storage, loss, suffix: str = "", **style: Any) -> list[Curve]:
+    both = (("G′", storage, "o", NETWORK), ("G″", loss, "s", SPARSE))
+    return [
+        (along, values, {"color": colour, "marker": marker, "label": symbol + suffix, **style})
+        for symbol, values, marker, colour in both
+    ]
+
+
+def _decades_where_positive(values: Float[np.ndarray, " n"]) -> dict[str, str]:
+    """Return a logarithmic scale of ordinates, unless some have no place on it."""
+    return {"yscale": "log"} if np.all(values > 0.0) else {}
 
 
 def _linear_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum | None) -> Picture:
     omega = sweep.angular_frequency
-    with figure(1, 2, width=10.0, height=3.2) as (drawing, axes):
-        panel, modes = axes[0]
-        _moduli(panel, omega, sweep.storage_modulus, sweep.loss_modulus, **_POINTS)
-        panel.set(xscale="log", yscale="log", xlabel="ω (rad/s)", ylabel="G′, G″ (Pa)")
-        caption = "lve.csv: G′ and G″ against frequency."
-        if spectrum is None:
-            modes.set_visible(False)
-        else:
-            dense = np.geomspace(omega[0], omega[-1], 200)
-            for values, colour in zip(spectrum.moduli(dense), (NETWORK, SPARSE), strict=True):
-                panel.plot(dense, values, color=colour, lw=1.0)
-            panel.plot([], [], color=BEFORE, lw=1.0, label="modes")
-            modes.plot(
-                spectrum.relaxation_time, spectrum.modulus, color=GREEN, marker="D", **_POINTS
-            )
-            modes.set(xscale="log", yscale="log", xlabel="λ (s)", ylabel="G of each mode (Pa)")
-            for edge in (1.0 / omega[0], 1.0 / omega[-1]):
-                modes.axvline(edge, color=BEFORE, lw=0.8, ls=":")
-            caption += (
-                f" Lines: the {counted(len(spectrum), 'mode')} found from it, off by "
-                f"{percent(spectrum.relative_error)} (root mean square). Right: modulus and time "
-                "of each; dotted, the ends of the sweep, beyond which it says nothing of them."
-            )
-        legend_above(drawing, axes)
-        return picture(drawing, "linear_sweep", caption)
+    curves = _moduli(omega, *sweep.measured, **_POINTS)
+    labels = {"xlabel": "ω (rad/s)", "ylabel": "G′, G″ (Pa)"}
+    panels = [Panel(curves, {**_LOGARITHMIC, **labels})]
+    caption = "lve.csv: G′ and G″ against frequency."
+    if spectrum is not None:
+        dense = np.geomspace(omega[0], omega[-1], 200)
+        for values, colour in zip(spectrum.moduli(dense), (NETWORK, SPARSE), strict=True):
+            curves.append((dense, values, {"color": colour, "lw": 1.0}))
+        curves.append(([], [], {"color": BEFORE, "lw": 1.0, "label": "modes"}))
+        times, moduli = spectrum.relaxation_time, spectrum.modulus
+        ends = float(np.min(moduli)), float(np.max(moduli))
+        edges = ([1.0 / edge] * 2 for edge in (omega[0], omega[-1]))
+        modes: list[Curve] = [(edge, ends, {"color": BEFORE, **_DOTTED}) for edge in edges]
+        modes.append((times, moduli, {"color": GREEN, "marker": "D", **_POINTS}))
+        labels = {"xlabel": "λ (s)", "ylabel": "G of each mode (Pa)"}
+        panels.append(Panel(modes, {**_LOGARITHMIC, **labels}))
+        caption += (
+            f" Lines: the {counted(len(spectrum), 'mode')} found from it, off by "
+            f"{percent(spectrum.relative_error)} (root mean square). Right: modulus and time of "
+            "each; dotted, the ends of the sweep, beyond which it says nothing of them."
+        )
+    return row_of_panels("linear_sweep", caption, panels)
 
 
 def _amplitude_sweep(run: Run, sweep: LinearSweep | None) -> Picture:
     assert run.strain is not None
     assert run.storage_modulus is not None
     assert run.loss_modulus is not None
-    omega = run.angular_frequency
-    with figure(1, 1, width=10.0, height=3.2) as (drawing, axes):
-        panel = axes[0, 0]
-        groups = np.unique(np.round(omega, 9))
-        for value in groups:
-            at = np.isclose(omega, value)
-            suffix = f", {value:.3g} rad/s" if len(groups) < 4 else ""
-            style = {**_POINTS, "ls": "-", "lw": 0.6}
-            moduli = run.storage_modulus[at], run.loss_modulus[at]
-            _moduli(panel, run.strain[at], *moduli, suffix, **style)
-        caption = "amplitude_sweep.csv: the moduli of the first harmonic against strain amplitude."
-        if sweep is not None:
-            edges = sweep.angular_frequency
-            inside = groups[(groups >= edges[0]) & (groups <= edges[-1])]
-            for values, colour in ((sweep.storage_modulus, NETWORK), (sweep.loss_modulus, SPARSE)):
-                levels = np.interp(np.log(inside), np.log(edges), values)
-                for level in levels:
-                    panel.axhline(level, color=colour, lw=0.8, ls=":")
-            caption += " Dotted: lve.csv at these frequencies, which small strains should meet."
-        panel.set(xscale="log", xlabel="strain amplitude γ₀", ylabel="G′, G″ (Pa)")
-        _decades_where_positive(panel, np.concatenate([run.storage_modulus, run.loss_modulus]))
-        legend_above(drawing, axes)
-        return picture(drawing, "amplitude_sweep", caption)
-
-
-def _decades_where_positive(panel, values: Float[np.ndarray, " n"]) -> None:
-    """Make the axis of values logarithmic, unless some have no place on it."""
-    if np.all(values > 0.0):
-        panel.set_yscale("log")
+    omega, strain = run.angular_frequency, run.strain
+    groups = np.unique(np.round(omega, 9))
+    curves: list[Curve] = []
+    for value in groups:
+        at = np.isclose(omega, value)
+        suffix = f", {value:.3g} rad/s" if len(groups) < 4 else ""
+        style = {**_POINTS, "ls": "-", "lw": 0.6}
+        moduli = run.storage_modulus[at], run.loss_modulus[at]
+        curves += _moduli(strain[at], *moduli, suffix, **style)
+    caption = "amplitude_sweep.csv: the moduli of the first harmonic against strain amplitude."
+    if sweep is not None:
+        edges = sweep.angular_frequency
+        inside = groups[(groups >= edges[0]) & (groups <= edges[-1])]
+        ends = float(np.min(strain)), float(np.max(strain))
+        for values, colour in zip(sweep.measured, (NETWORK, SPARSE), strict=True):
+            for level in np.interp(np.log(inside), np.log(edges), values):
+                curves.append((ends, [level, level], {"color": colour, **_DOTTED}))
+        caption += " Dotted: lve.csv at these frequencies, which small strains should meet."
+    scale = _decades_where_positive(np.concatenate([run.storage_modulus, run.loss_modulus]))
+    labels = {"xlabel": "strain amplitude γ₀", "ylabel": "G′, G″ (Pa)"}
+    panel = Panel(curves, {"xscale": "log", **scale, **labels})
+    return row_of_panels("amplitude_sweep", caption, [panel])
 
 
 def _flow_curve(run: Run, sweep: LinearSweep | None) -> Picture:
-    with figure(1, 2, width=10.0, height=3.2) as (drawing, axes):
-        panel, viscosity = axes[0]
-        panel.plot(run.rate, run.stress, color=NETWORK, marker="o", label="σ₁₂", **_POINTS)
-        for quantity, colour in zip(run.beside, (SPARSE, GREEN), strict=False):
-            values = run.observing(quantity).recorded
-            panel.plot(
-                run.rate,
-                values,
-                color=colour,
-                marker="^",
-                label=FIGURE_SYMBOLS[quantity],
-                **_POINTS,
-            )
-        panel.set(xscale="log", xlabel="shear rate (1/s)", ylabel="stress (Pa)")
-        _decades_where_positive(panel, run.stress)
-        viscosity.plot(
-            run.rate, run.stress / run.rate, color=NETWORK, marker="o", label="η = σ₁₂/γ̇", **_POINTS
+    marked = {"color": NETWORK, "marker": "o", **_POINTS}
+    stresses: list[Curve] = [(run.rate, run.stress, {**marked, "label": "σ₁₂"})]
+    for quantity, colour in zip(run.beside, (SPARSE, GREEN), strict=False):
+        style = {"color": colour, "marker": "^", "label": FIGURE_SYMBOLS[quantity], **_POINTS}
+        stresses.append((run.rate, run.observing(quantity).recorded, style))
+    steady = run.stress / run.rate
+    viscosities: list[Curve] = [(run.rate, steady, {**marked, "label": "η = σ₁₂/γ̇"})]
+    caption = "flow_curve.csv: steady stress, and steady viscosity (right)."
+    if sweep is not None:
+        size = np.hypot(*sweep.measured) / sweep.angular_frequency
+        style = {"color": GREEN, "lw": 1.2, "label": "|η*| of lve.csv"}
+        viscosities.append((sweep.angular_frequency, size, style))
+        caption += (
+            " Right, the complex viscosity at ω equal to the shear rate: most melts and solutions "
+            "follow it (Cox and Merz 1958); a constant factor between the two is a unit or a "
+            "loading, and gels and suspensions need not follow it."
         )
-        caption = "flow_curve.csv: steady stress, and steady viscosity (right)."
-        if sweep is not None:
-            omega = sweep.angular_frequency
-            size = np.hypot(sweep.storage_modulus, sweep.loss_modulus) / omega
-            viscosity.plot(omega, size, color=GREEN, lw=1.2, label="|η*| of lve.csv")
-            caption += (
-                " Right, the complex viscosity at ω equal to the shear rate: most melts and "
-                "solutions follow it (Cox and Merz 1958); a constant factor between the two is a "
-                "unit or a loading, and gels and suspensions need not follow it."
-            )
-        viscosity.set(xscale="log", xlabel="γ̇ (1/s) or ω (rad/s)", ylabel="viscosity (Pa s)")
-        _decades_where_positive(viscosity, run.stress)
-        legend_above(drawing, axes)
-        return picture(drawing, "flow_curve", caption)
+    scales = {"xscale": "log", **_decades_where_positive(run.stress)}
+    left = {**scales, "xlabel": "shear rate (1/s)", "ylabel": "stress (Pa)"}
+    right = {**scales, "xlabel": "γ̇ (1/s) or ω (rad/s)", "ylabel": "viscosity (Pa s)"}
+    return row_of_panels("flow_curve", caption, [Panel(stresses, left), Panel(viscosities, right)])
 
 
 def linear_function(run: Run) -> tuple[str, Float[np.ndarray, " n"], str]:
@@ -217,106 +208,62 @@ def linear_function(run: Run) -> tuple[str, Float[np.ndarray, " n"], str]:
 
 
 def _over_time(runs: Sequence[Run]) -> Picture:
-    with figure(1, len(runs), width=5.0 * len(runs), height=3.0) as (drawing, axes):
-        for panel, run in zip(axes[0], runs, strict=True):
-            symbol, values, unit = linear_function(run)
-            panel.plot(run.time, values, color=NETWORK, marker="o", **_POINTS)
-            panel.set(
-                xscale="log",
-                yscale="log",
-                xlabel="time (s)",
-                ylabel=f"{symbol} ({unit})",
-                title=literal(run.name),
-            )
-        return picture(
-            drawing, "over_time", "Linear material functions in time, as they were read."
-        )
+    panels = []
+    for run in runs:
+        symbol, values, unit = linear_function(run)
+        labels = {"xlabel": "time (s)", "ylabel": f"{symbol} ({unit})", "title": literal(run.name)}
+        curve = run.time, values, {"color": NETWORK, "marker": "o", **_POINTS}
+        panels.append(Panel([curve], {**_LOGARITHMIC, **labels}))
+    caption = "Linear material functions in time, as they were read."
+    return row_of_panels("over_time", caption, panels, width=5.0 * len(runs))
 
 
 _MARKERS = "os^vD<>ph*"
-_SHIFTED_POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.8}
-_TABLES = {RELAXATION: ("G/b_T (Pa)", NETWORK), CREEP: ("J b_T (1/Pa)", SPARSE)}
+_MOST_NAMED = 10
+"""Temperatures that a legend names."""
 _LINES = {"WLF": ("-", NETWORK), "Arrhenius": ("--", SPARSE)}
 
 
 def superposition_pictures(found: Superposition) -> list[Picture]:
     """Return the pictures of a superposition."""
-    pictures = [_overlap(found), _van_gurp(found)] if SWEEP in found.tests else []
-    if any(kind != SWEEP for kind in found.tests):
-        pictures.append(_functions_over_time(found))
-    return [*pictures, _shifts(found)]
+    styles = {
+        celsius: {"marker": _MARKERS[i % len(_MARKERS)], **_POINTS}
+        for i, celsius in enumerate(found.celsius.tolist())
+    }
+    named = len(styles) <= _MOST_NAMED
+    overlaps = []
+    for which, (symbol, colour) in enumerate((("G′", NETWORK), ("G″", SPARSE))):
+        curves = [
+            (
+                found.moved[at].angular_frequency,
+                found.moved[at].measured[which],
+                {**style, "color": colour, "label": f"{at:g} °C" if named else ""},
+            )
+            for at, style in styles.items()
+        ]
+        labels = {"xlabel": "ω a_T (rad/s)", "ylabel": f"{symbol}/b_T (Pa)"}
+        overlaps.append(Panel(curves, {**_LOGARITHMIC, **labels}))
+    caption = f"All sweeps as at {found.reference:g} °C, a mark for each temperature."
+    overlap = row_of_panels("overlap", caption, overlaps, height=3.8, columns=5)
+    return [overlap, _van_gurp(found, styles), _shifts(found)]
 
 
-def _labels(found: Superposition) -> list[tuple[str, str]]:
-    return [
-        (f"{degrees:g} °C", _MARKERS[i % len(_MARKERS)]) for i, degrees in enumerate(found.celsius)
-    ]
-
-
-def _marked(found: Superposition, kind: str) -> Iterator[tuple[float, str, str]]:
-    """Yield temperature, label and marker of the moved tests of a kind."""
-    for degrees, (label, marker) in zip(found.celsius.tolist(), _labels(found), strict=True):
-        if degrees in found.tests[kind]:
-            yield degrees, label, marker
-
-
-def _overlap(found: Superposition) -> Picture:
-    with figure(1, 2, width=10.0, height=3.8) as (drawing, axes):
-        for degrees, label, marker in _marked(found, SWEEP):
-            moved = found.moved(SWEEP, degrees).sweep
-            for panel, values, colour in (
-                (axes[0, 0], moved.storage_modulus, NETWORK),
-                (axes[0, 1], moved.loss_modulus, SPARSE),
-            ):
-                style = {**_SHIFTED_POINTS, "marker": marker, "color": colour}
-                panel.plot(moved.angular_frequency, values, label=label, **style)
-        for panel, symbol in zip(axes[0], ("G′", "G″"), strict=True):
-            panel.set(yscale="log", xlabel="ω a_T (rad/s)", ylabel=f"{symbol}/b_T (Pa)")
-            make_logarithmic(panel.xaxis)
-        if len(found.celsius) <= 10:
-            handles, labels = axes[0, 0].get_legend_handles_labels()
-            drawing.legend(handles, labels, loc="outside upper center", ncols=5)
-        caption = f"All sweeps as at {found.reference:g} °C, a mark for each temperature."
-        return picture(drawing, "overlap", caption)
-
-
-def _van_gurp(found: Superposition) -> Picture:
-    with figure(1, 2, width=10.0, height=3.4) as (drawing, axes):
-        for degrees, _, marker in _marked(found, SWEEP):
-            storage, loss = found.tests[SWEEP][degrees].values
-            style = {**_SHIFTED_POINTS, "marker": marker, "color": NETWORK}
-            axes[0, 0].plot(np.hypot(storage, loss), np.degrees(np.arctan2(loss, storage)), **style)
-            axes[0, 1].plot(storage, loss, **style)
-        axes[0, 0].set(xscale="log", xlabel="|G*| (Pa)", ylabel="δ (°)")
-        axes[0, 1].set(xscale="log", yscale="log", xlabel="G′ (Pa)", ylabel="G″ (Pa)")
-        caption = (
-            "As measured, without any shift: phase angle against complex modulus (van Gurp and "
-            "Palmen 1998), and G″ against G′ (Cole and Cole). Where one curve is not the "
-            "continuation of the next, no shift in time makes them one; a shift along |G*| alone "
-            "is b_T."
-        )
-        return picture(drawing, "van_gurp", caption)
-
-
-def _functions_over_time(found: Superposition) -> Picture:
-    kinds = [kind for kind in found.tests if kind != SWEEP]
-    with figure(1, len(kinds), width=10.0, height=3.8) as (drawing, axes):
-        for panel, kind in zip(axes[0], kinds, strict=True):
-            symbol, colour = _TABLES[kind]
-            for degrees, label, marker in _marked(found, kind):
-                moved = found.moved(kind, degrees)
-                style = {**_SHIFTED_POINTS, "marker": marker, "color": colour}
-                panel.plot(moved.argument, moved.values[0], label=label, **style)
-            panel.set(yscale="log", xlabel="t/a_T (s)", ylabel=symbol)
-            make_logarithmic(panel.xaxis)
-        if len(found.celsius) <= 10:
-            handles, labels = axes[0, 0].get_legend_handles_labels()
-            drawing.legend(handles, labels, loc="outside upper center", ncols=5)
-        caption = (
-            f"Tables over time as at {found.reference:g} °C, averages evenly spaced in log time, a "
-            "mark for each temperature."
-        )
-        return picture(drawing, "over_time", caption)
+def _van_gurp(found: Superposition, styles: dict[float, dict[str, Any]]) -> Picture:
+    phases, moduli = [], []
+    for at, style in styles.items():
+        storage, loss = found.sweeps[at].measured
+        angle = np.degrees(np.arctan2(loss, storage))
+        phases.append((np.hypot(storage, loss), angle, {**style, "color": NETWORK}))
+        moduli.append((storage, loss, {**style, "color": NETWORK}))
+    left = {"xscale": "log", "xlabel": "|G*| (Pa)", "ylabel": "δ (°)"}
+    right = {**_LOGARITHMIC, "xlabel": "G′ (Pa)", "ylabel": "G″ (Pa)"}
+    return row_of_panels(
+        "van_gurp",
+        "As measured, without any shift: phase angle against complex modulus (van Gurp and Palmen "
+        "1998), and G″ against G′ (Cole and Cole). Where one curve is not the continuation of the "
+        "next, no shift in time makes them one; a shift along |G*| alone is b_T.",
+        [Panel(phases, left), Panel(moduli, right)],
+    )
 
 
 def _shifts(found: Superposition) -> Picture:

@@ -58,31 +58,21 @@ def style_sheet() -> str:
 
 # Stand-ins, each a value of its own: CSS variables of the palette take their place where a picture
 # follows light and dark.
-TRUTH = "#101112"
-BEFORE = "#909192"
-SPARSE = "#d55e00"
-NETWORK = "#0072b2"
-MEASURED = "#707172"
-GREEN = "#009e73"
-PURPLE = "#cc79a7"
-YELLOW = "#e69f00"
-INK = "#202122"
-GRID = "#d0d1d2"
-SHADE = "#e0e1e2"
-
 _VARIABLES = {
-    TRUTH: "truth",
-    BEFORE: "before",
-    SPARSE: "sparse",
-    NETWORK: "network",
-    MEASURED: "measured",
-    GREEN: "green",
-    PURPLE: "purple",
-    YELLOW: "yellow",
-    INK: "ink",
-    GRID: "grid",
-    SHADE: "shade",
+    "#101112": "truth",
+    "#909192": "before",
+    "#d55e00": "sparse",
+    "#0072b2": "network",
+    "#707172": "measured",
+    "#009e73": "green",
+    "#cc79a7": "purple",
+    "#e69f00": "yellow",
+    "#202122": "ink",
+    "#d0d1d2": "grid",
+    "#e0e1e2": "shade",
 }
+TRUTH, BEFORE, SPARSE, NETWORK, MEASURED, GREEN, PURPLE, YELLOW, INK, GRID, SHADE = _VARIABLES
+
 _EARLY = 0.1  # share of a run that holds half of its samples, were they spaced evenly 0.5
 _DECADES = 30.0
 
@@ -92,12 +82,6 @@ _LEARNER_STYLES: dict[str, dict[str, Any]] = {
 }
 _OTHERS = (PURPLE, YELLOW, GREEN)
 """Colours of learners of users' own, in their order."""
-
-OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
-    {"color": colour, "linestyle": line, "linewidth": 1.3}
-    for colour, line in ((GREEN, "--"), (PURPLE, ":"), (YELLOW, "--"), (INK, ":"))
-)
-"""Of what a study asks to be drawn in addition, in its order."""
 
 CHOSEN_STYLE: dict[str, Any] = {"color": SPARSE, "linestyle": "-"}
 RIVAL_STYLES: tuple[dict[str, Any], ...] = (
@@ -248,6 +232,44 @@ def panels_of(
         for panel in axes.ravel()[count:]:
             panel.set_visible(False)
         yield drawing, axes, axes.ravel()[:count]
+
+
+Curve = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray, Mapping[str, Any]]
+"""Abscissae, ordinates, and the style of the line as `matplotlib.axes.Axes.plot` takes it."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What one panel shows.
+
+    `settings`: labels, scales and limits, as `matplotlib.axes.Axes.set` takes them. `bands`: what
+    is shaded, by abscissae, lower and upper ends, and the style of the shade.
+    """
+
+    curves: Sequence[Curve]
+    settings: Mapping[str, Any]
+    bands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, Mapping[str, Any]]] = ()
+
+
+def row_of_panels(
+    name: str, caption: str, panels: Sequence[Panel], width: float = 10.0, height: float = 3.2,
+    columns: int = 4,
+) -> "Picture":  # fmt: skip
+    """Return a picture of panels side by side, with one legend of so many columns at most.
+
+    `width`, `height`: in inches, of all of it and without the legend.
+    """
+    with figure(1, len(panels), width, height) as (drawing, axes):
+        for panel, one in zip(axes[0], panels, strict=True):
+            for along, low, high, style in one.bands:
+                shade_between(panel, along, low, high, **style)
+            for along, values, style in one.curves:
+                panel.plot(along, values, **style)
+            panel.set(**one.settings)
+            if one.settings.get("xscale") == "log":
+                panel.xaxis.set_minor_formatter(NullFormatter())
+        legend_above(drawing, axes, columns)
+        return picture(drawing, name, caption)
 
 
 def label_rows(axes, labels: Sequence[str]) -> None:

@@ -1,18 +1,18 @@
 """Stresses in one flow: against time, as Lissajous curves, and in start-up."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
-from discover.report.overlay import Overlay
 from discover.report.plots.style import (
     BEFORE_STYLE,
     INK,
     MEASURED,
-    OVERLAY_STYLES,
     SHADE,
     SPARSE,
     TRUTH_STYLE,
@@ -48,7 +48,7 @@ def units(comparison: Comparison) -> tuple[str, str, str]:
     return " (Pa)", "t (s)", "γ̇ (1/s)"
 
 
-def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()):
+def curves(comparison: Comparison, flow: Flow):
     """Yield label, style and stresses of everything known in a flow, in drawing order."""
     before = comparison.before[flow.key]
     if before is not None:
@@ -61,12 +61,9 @@ def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ())
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
             yield learner_title(name), learner_style(name), prediction
-    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
-        if flow.key in overlay.curves:
-            yield literal(overlay.label), style, overlay.curves[flow.key]
 
 
-def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()) -> Picture:
+def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
     last = last_cycle(flow)
@@ -75,7 +72,7 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
     with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
-            for label, style, stresses in curves(comparison, flow, overlays):
+            for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
                     row[0].plot(flow.times, stresses[quantity], label=label, **style)
                     for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
@@ -106,9 +103,7 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
         )
 
 
-def start_up_picture(
-    comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()
-) -> Picture:
+def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in start-up, or else what was recorded, such as the strain of creep."""
     stress_unit, _, _ = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
@@ -117,7 +112,7 @@ def start_up_picture(
         if not flow.is_truth:
             shown = np.ones_like(shown)
         for panel, quantity in zip(axes[0], quantities, strict=True):
-            for label, style, stresses in curves(comparison, flow, overlays):
+            for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
                     panel.plot(flow.along[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
@@ -138,20 +133,30 @@ def start_up_picture(
 def training_picture(comparison: Comparison) -> Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
-    stress_unit, _, _ = units(comparison)
     kinds = {flow.protocol.quantity for flow in flows}
     recorded = listed([symbol for kind, symbol in FIGURE_SYMBOLS.items() if kind in kinds])
+    with drawn_records(comparison, flows) as drawing:
+        return picture(
+            drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
+        )
+
+
+@contextmanager
+def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Figure]:
+    """Yield a figure with a panel for each flow: what was recorded of it, and every learner."""
+    stress_unit, _, _ = units(comparison)
     with panels_of(len(flows), height=1.8) as (drawing, axes, panels):
         for panel, flow in zip(panels, flows, strict=True):
-            if flow.measured is not None:
-                panel.plot(flow.along, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
+            recorded = flow.measured
+            if recorded is None and flow.kind != "training" and flow.is_record:
+                recorded = flow.reference.get("sigma12")
+            if recorded is not None:
+                panel.plot(flow.along, recorded, ".", color=MEASURED, ms=2.5, label="data")
             for name, outcome in comparison.outcomes.items():
                 prediction = outcome.predictions[flow.key]
                 if prediction is not None:
-                    style = learner_style(name)
-                    panel.plot(
-                        flow.along, prediction["sigma12"], label=learner_title(name), **style
-                    )
+                    style = {**learner_style(name), "label": learner_title(name)}
+                    panel.plot(flow.along, prediction["sigma12"], **style)
             _draw_band(panel, comparison, flow, "sigma12", slice(None))
             panel.set_title(literal(flow.title), fontsize=8)
             _set_scales(panel, flow, "sigma12", truth_too=True)
@@ -163,9 +168,7 @@ def training_picture(comparison: Comparison) -> Picture:
         symbols = [FIGURE_SYMBOLS[flow.protocol.quantity] for flow in flows]
         label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units_of, strict=True)])
         legend_above(drawing, axes)
-        return picture(
-            drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
-        )
+        yield drawing
 
 
 def _seen(comparison: Comparison, flow: Flow) -> str:

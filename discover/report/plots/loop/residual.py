@@ -1,20 +1,19 @@
-"""Pictures of what a closed loop leaves: residuals, and on what they depend."""
+"""Pictures of what a closed loop leaves: residuals, errors, and constants by mode."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
 from discover.loop.by_quantity import FASTER
-from discover.loop.reading import differences
+from discover.loop.constants import ConstantByMode
 from discover.report.plots.loop.runs import (
-    AS_DECLARED,
     FIT_COLOUR,
     HELD_COLOUR,
-    WITH_EFFECTS,
     along_in_common,
     axis_label,
     models_of,
-    shortened,
     symbol_of,
     through_decades,
 )
@@ -22,19 +21,20 @@ from discover.report.plots.style import (
     BEFORE,
     GREEN,
     INK,
+    NETWORK,
+    SHADE,
+    Panel,
     Picture,
     figure,
     legend_above,
     literal,
     make_logarithmic,
     make_percentage,
-    panels_of,
     picture,
+    row_of_panels,
 )
 from discover.report.wording import percent
-from discover.words import effect_title, listed
-
-_UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
+from discover.words import effect_title, listed, readable, significant
 
 
 def residual_picture(result: LoopResult) -> Picture:
@@ -84,77 +84,6 @@ def residual_picture(result: LoopResult) -> Picture:
             + " It should look like noise around zero; anything else is a missing effect.",
             switched=tuple(record.name for record in records),
         )
-
-
-def reading_picture(result: LoopResult) -> Picture | None:
-    """Return on what the residual depends, before and after."""
-    readings = [(result.readings[0], AS_DECLARED, BEFORE)]
-    if result.stages:
-        readings.append((result.readings[1], WITH_EFFECTS, FIT_COLOUR))
-    if not readings[0][0].collapses:
-        return None
-    waves = any(reading.waves for reading, _, _ in readings)
-    with figure(1, 3 if waves else 2, width=10.0, height=2.8) as (drawing, axes):
-        names = [c.coordinate for c in readings[0][0].collapses]
-        for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=False):
-            shares = {c.coordinate: 100.0 * c.share for c in reading.collapses}
-            places = np.arange(len(names)) + shift
-            axes[0, 0].barh(
-                places, [shares.get(n, 0.0) for n in names], 0.36, color=colour, label=label
-            )
-        axes[0, 0].set_yticks(range(len(names)), [f"along {name}" for name in names])
-        axes[0, 0].set_xlim(0.0, 100.0)
-        axes[0, 0].set_xlabel("squared residual in common (%)")
-        _draw_run_by_run(axes[0, 1], result)
-        if waves:
-            _draw_waves(axes[0, 2], readings)
-        legend_above(drawing, axes)
-        caption = (
-            "Left: how much of the squared residual the runs share when drawn against each "
-            "coordinate, each run predicted from the others. Right of it: the error of each run."
-        )
-        if waves:
-            caption += (
-                " Far right: parts of the residual of each oscillating run: fundamental in phase "
-                "with the strain and with the rate, higher harmonics, drift."
-            )
-        return picture(drawing, "reading", caption)
-
-
-def _draw_run_by_run(panel, result: LoopResult) -> None:
-    """Draw the error of each run against what its residual follows, or the largest shear rate."""
-    varied = differences(result.records)
-    followed = [trend.quantity for trend in result.readings[1].trends]
-    name = next(iter([*followed, *varied]), None)
-    if name is None:
-        panel.set_visible(False)
-        return
-    values = varied[name]
-    for (model, label), colour in zip(
-        models_of(result.records), (BEFORE, FIT_COLOUR), strict=False
-    ):
-        errors = [100.0 * float(record.errors[model]) for record in result.records]
-        panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
-    if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
-        panel.set_xscale("log")
-    make_percentage(panel.yaxis)
-    unit = f" ({_UNITS[name]})" if name in _UNITS else ""
-    panel.set_xlabel(literal(name.replace("_", " ")) + unit)
-    panel.set_ylabel("relative error (%)")
-
-
-def _draw_waves(panel, readings) -> None:
-    parts = ("elastic", "viscous", "odd", "even", "drift")
-    for shift, (reading, label, colour) in zip((-0.15, 0.15), readings, strict=False):
-        for place, part in enumerate(parts):
-            sizes = [100.0 * abs(getattr(wave, part)) for wave in reading.waves]
-            panel.plot([place + shift] * len(sizes), sizes, "o", ms=4.0, color=colour, label=label)
-    panel.set_xticks(range(len(parts)), parts, rotation=30)
-    panel.set_ylabel("residual (% of fundamental)")
-
-
-MOST_RANKED = 12
-"""Candidates of a stage that are shown, the best."""
 
 
 def waterfall_picture(result: LoopResult) -> Picture:
@@ -215,54 +144,62 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
     panel.hlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
 
 
-def ranking_picture(result: LoopResult) -> Picture | None:
-    """Return what each candidate would remove of the residual, stage by stage."""
-    rankings = [ranking for ranking in result.rankings if ranking]
-    if not rankings:
+# whether a constant is left open, colour and filling of its mark, and what that is called
+_KINDS = (
+    (False, NETWORK, NETWORK, "fitted"),
+    (True, BEFORE, "none", "not determined by these data"),
+)
+
+
+def by_mode_picture(
+    constants: Mapping[str, ConstantByMode], is_unexplained: bool
+) -> Picture | None:
+    """Return each constant by mode with its band; None where there is none.
+
+    `constants`: by name of the parameter, the effect or the term. `is_unexplained`: whether a law
+    with these constants leaves more than noise.
+    """
+    if not constants:
         return None
-    with panels_of(len(rankings), 3, width=10.0, height=3.0) as (drawing, _, panels):
-        for number, (panel, ranking) in enumerate(zip(panels, rankings, strict=True)):
-            best = ranking[:MOST_RANKED][::-1]
-            chosen = result.stages[number].effect if number < len(result.stages) else None
-            panel.barh(
-                [effect_title(c.effect) for c in best],
-                [100.0 * max(c.score, 0.0) for c in best],
-                color=[GREEN if c.effect == chosen else BEFORE for c in best],
-            )
-            panel.set_xlim(0, 100)
-            kept = any(c.effect == chosen for c in best)
-            said = "" if kept else ": taken later" if chosen else ": none added"
-            panel.set_title(f"stage {number + 1}{said}")
-            panel.set_xlabel("squared residual explained (%)")
-            panel.tick_params(axis="y", labelsize=7.5)
-        return picture(
-            drawing,
-            "ranking",
-            "What each candidate would explain of the squared residual of the fitted runs, to "
-            "first order, given what is fitted already; in green the one that was added. "
-            "Evidence chooses among sets of effects, so it need not be the longest bar.",
+    panels = []
+    for name, constant in constants.items():
+        told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
+        bands = []
+        if told:
+            times, low, high = np.array(sorted(told)).T
+            bands = [(times, low, high, {"color": SHADE, "label": "95 % interval"})]
+        points = {"marker": "o", "ms": 5.0, "ls": "none"}
+        curves = []
+        for left_open, colour, fill, label in _KINDS:
+            shown = [mode for mode in constant.modes if mode.left_open is left_open]
+            times = [mode.relaxation_time_s for mode in shown]
+            style = {**points, "color": colour, "mfc": fill, "label": label}
+            curves.append((times, [mode.value for mode in shown], style))
+        label = literal(readable(effect_title(name)))
+        settings = {"xscale": "log", "xlabel": "relaxation time (s)", "ylabel": label}
+        panels.append(Panel(curves, settings, bands))
+    said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
+    doubt = ""
+    if is_unexplained:
+        doubt = (
+            " The data are not explained, so these are the values that come nearest, and no "
+            "constants of the fluid."
         )
+    caption = f"{said}{doubt} Intervals take it that the law is the fluid's."
+    return row_of_panels("by_mode", caption, panels, 9.0, 2.8)
 
 
-def run_error_picture(result: LoopResult) -> Picture:
-    """Return the error of every run before and after, or of the law as declared alone."""
-    records = result.records
-    added = any(len(r.errors) > 1 for r in records)
-    model = WITH_EFFECTS if added else AS_DECLARED
-    with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
-        panel = axes[0, 0]
-        for position, record in enumerate(records[::-1]):
-            before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
-            colour = HELD_COLOUR if record.held_out else FIT_COLOUR
-            panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
-            if added:
-                panel.plot(before, position, "o", mfc="none", color=BEFORE, label=AS_DECLARED)
-            label = f"{model}, {'held out' if record.held_out else 'fitted'}"
-            panel.plot(after, position, "o", color=colour, label=label)
-        panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
-        panel.set_ylim(-0.6, len(records) - 0.4)
-        make_percentage(panel.xaxis)
-        panel.set_xlabel("relative error (%)")
-        legend_above(drawing, axes)
-        told = "without and with effects" if added else "of your model"
-        return picture(drawing, "run_errors", f"Error of each run, {told}.")
+def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
+    """Return what the data say of a constant by mode."""
+    symbol = readable(effect_title(name))
+    gain = significant(constant.evidence[-1], 2)
+    text = f"{symbol} is free in each mode that the runs tell (evidence over one constant: {gain})"
+    known = [mode for mode in constant.modes if not mode.left_open]
+    if not known:
+        return f"{text}, and not determined by these data in any mode."
+    parts = [f"{significant(m.value, 2)} at {significant(m.relaxation_time_s, 2)} s" for m in known]
+    open_ones = [significant(m.relaxation_time_s, 2) for m in constant.modes if m.left_open]
+    text = f"{text}: {', '.join(parts)}."
+    if open_ones:
+        text += f" Not determined by these data in the modes of {', '.join(open_ones)} s."
+    return text

@@ -1,26 +1,27 @@
 """Pictures of the runs of a closed loop: data and predictions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from discover.loop import RunRecord
 from discover.loop.loop_result import LoopResult
 from discover.loop.reading import oscillation
 from discover.protocols.kinematics import MODULI
-from discover.report.overlay import Overlay
 from discover.report.plots.style import (
     BEFORE,
     CHOSEN_STYLE,
-    INK,
     MEASURED,
     NETWORK,
-    OVERLAY_STYLES,
     RIVAL_STYLES,
     SHADE,
     SPARSE,
     TRUTH,
+    Panel,
     Picture,
     about_middle,
     figure,
@@ -31,12 +32,12 @@ from discover.report.plots.style import (
     make_logarithmic,
     panels_of,
     picture,
+    row_of_panels,
     runs_through_decades,
     shade_between,
 )
 from discover.report.wording import free_form_sentence, percent, recorded_symbol
-from discover.statistics.noise.noise_model import rms
-from discover.words import FIGURE_SYMBOLS, effect_title, effects_title
+from discover.words import FIGURE_SYMBOLS, effects_title
 
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
@@ -93,14 +94,40 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     return f" {what} {', '.join(told)}." * (len(found) > 1)
 
 
-def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
-    """Return every run: measured, the law as declared, with effects, and overlays."""
+def runs_picture(result: LoopResult) -> Picture:
+    """Return every run: measured, the law as declared, and with effects."""
     records = result.records
+    with drawn_runs(records) as drawing:
+        return picture(
+            drawing,
+            "runs",
+            "Measured and predicted, run by run."
+            + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
+            + _what_is_drawn(records),
+        )
+
+
+AS_DECLARED, WITH_EFFECTS = "your model", "with effects"
+"""The two models of a closed loop, as pictures name them."""
+
+FITTED_LAW = "", "law"
+"""Names of a law's prediction alone, whatever it started from."""
+
+
+@contextmanager
+def drawn_runs(
+    records: Sequence[RunRecord], names: tuple[str, str] = (AS_DECLARED, WITH_EFFECTS)
+) -> Iterator[Figure]:
+    """Yield a figure with a panel for each run.
+
+    `names`: of the first and the last prediction; without the first the last alone is drawn.
+    """
+    if not names[0]:
+        records = [replace(r, predicted=r.predicted[-1:], errors=r.errors[-1:]) for r in records]
     with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
         for panel, record in zip(panels, records, strict=True):
             every = max(1, record.time.size // 60)
-            draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
-            draw_overlays(panel, record, overlays, record.along[1], slice(None))
+            draw_run(panel, record, record.along[1], slice(None, None, every), slice(None), names)
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -119,65 +146,38 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
                 panel.set_xlabel(record.along[0])
         label_rows(axes, [axis_label([record]) for record in records])
         legend_above(drawing, axes)
-        return picture(
-            drawing,
-            "runs",
-            "Measured and predicted, run by run."
-            + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
-            + _what_is_drawn(records)
-            + " Overlaid laws are the study's, fitted to nothing and without effects of the "
-            "instrument." * bool(overlays),
-        )
+        yield drawing
 
 
-def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples) -> None:
+def draw_run(
+    panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples,
+    names: tuple[str, str] = (AS_DECLARED, WITH_EFFECTS),
+) -> None:  # fmt: skip
     """Draw the measured stress, the law as declared and with effects in one run.
 
     `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
-    `shown`: which samples are marked as measured, and between which the models are drawn.
+    `shown`: which samples are marked as measured, and between which the models are drawn. `names`:
+    as in `drawn_runs`.
     """
+    colour = HELD_COLOUR if record.held_out else FIT_COLOUR
     if record.band is not None:
-        low, high = record.band[:, shown]
-        shade_between(
-            panel, along[shown], low, high, alpha=0.18, lw=0,
-            color=HELD_COLOUR if record.held_out else FIT_COLOUR,
-            label="95 % of measurements, all explanations",
-        )  # fmt: skip
-    panel.plot(
-        along[marked], record.measured[marked], "o", ms=2.5, mfc="none", mew=0.7, color=TRUTH,
-        label="measured",
-    )  # fmt: skip
-    panel.plot(
-        along[shown], record.predicted[0][shown], "-.", lw=1.1, color=BEFORE,
-        label=AS_DECLARED,
-    )  # fmt: skip
-    if len(record.predicted) == 1:  # nothing was added
-        return
-    panel.plot(
-        along[shown], record.predicted[-1][shown], lw=1.5,
-        color=HELD_COLOUR if record.held_out else FIT_COLOUR,
-        label=f"{WITH_EFFECTS}, {'held out' if record.held_out else 'fitted'}",
-    )  # fmt: skip
-
-
-def draw_overlays(
-    panel, record: RunRecord, overlays: Sequence[Overlay], along: np.ndarray, shown: Samples
-) -> None:
-    """Draw the curves that the study asks for in one run; arguments as in `draw_run`."""
-    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
-        curve = overlay.of(record.name, record.quantity)
-        if curve is not None:
-            panel.plot(along[shown], curve[shown], label=literal(overlay.label), **style)
+        label = "95 % of measurements, all explanations"
+        style = {"color": colour, "alpha": 0.18, "lw": 0, "label": label}
+        shade_between(panel, along[shown], *record.band[:, shown], **style)
+    style = {"ms": 2.5, "mfc": "none", "mew": 0.7, "color": TRUTH, "label": "measured"}
+    panel.plot(along[marked], record.measured[marked], "o", **style)
+    if names[0]:
+        style = {"lw": 1.1, "color": BEFORE, "label": names[0]}
+        panel.plot(along[shown], record.predicted[0][shown], "-.", **style)
+    if len(record.predicted) > 1 or not names[0]:
+        label = f"{names[1]}, {'held out' if record.held_out else 'fitted'}"
+        panel.plot(along[shown], record.predicted[-1][shown], lw=1.5, color=colour, label=label)
 
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
     """Return the models that a picture shows, by their place among the stages."""
     augmented = [(-1, WITH_EFFECTS)] * any(len(r.predicted) > 1 for r in records)
     return [(0, AS_DECLARED), *augmented]
-
-
-AS_DECLARED, WITH_EFFECTS = "your model", "with effects"
-"""The two models of a closed loop, as pictures name them."""
 
 
 def short_title(record: RunRecord) -> str:
@@ -203,7 +203,7 @@ def shortened(name: str) -> str:
 _MOST_DRAWN = 4
 
 
-def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture | None:
+def lissajous_picture(result: LoopResult) -> Picture | None:
     """Return σ12 against strain and against rate in the last cycle, or None without oscillation.
 
     The widest runs are shown, those held out before those fitted.
@@ -224,7 +224,6 @@ def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> P
                         label="measured, all cycles", zorder=1,
                     )  # fmt: skip
                 draw_run(panel, record, along, last, last)
-                draw_overlays(panel, record, overlays, along, last)
                 _frame(panel, record.measured)
             axes[0, column].set_title(short_title(record), fontsize=8)
             axes[0, column].set_xlabel("strain γ")
@@ -266,24 +265,17 @@ _AXES = {
 
 def free_form_picture(result: LoopResult) -> Picture | None:
     """Return each free function with its band; None where there is none."""
-    forms = result.free_form
-    if not forms:
-        return None
-    with figure(1, len(forms), width=9.0, height=2.8) as (drawing, axes):
-        for panel, one in zip(axes[0], forms, strict=True):
-            panel.fill_between(one.grid, one.low95, one.high95, color=SHADE, label="95 % band")
-            panel.plot(one.grid, one.value, color=NETWORK, lw=1.5, label="free function")
-            panel.axhline(0.0, color="0.6", lw=0.6)
-            along, up = _AXES[one.slot]
-            panel.set_xlabel(along.format(variable=one.variable))
-            panel.set_ylabel(up)
-        legend_above(drawing, axes)
-        said = "; ".join(map(free_form_sentence, forms))
-        return picture(
-            drawing,
-            "free_form",
-            f"Effect without a name: {said}. The bands assume that it depends on this alone.",
-        )
+    panels = []
+    for one in result.free_form:
+        along, up = _AXES[one.slot]
+        band = one.grid, one.low95, one.high95, {"color": SHADE, "label": "95 % band"}
+        curve = one.grid, one.value, {"color": NETWORK, "lw": 1.5, "label": "free function"}
+        zero = one.grid[[0, -1]], [0.0, 0.0], {"color": "0.6", "lw": 0.6}
+        labels = {"xlabel": along.format(variable=one.variable), "ylabel": up}
+        panels.append(Panel([curve, zero], labels, [band]))
+    said = "; ".join(map(free_form_sentence, result.free_form))
+    caption = f"Effect without a name: {said}. The bands assume that it depends on this alone."
+    return row_of_panels("free_form", caption, panels, 9.0, 2.8) if panels else None
 
 
 def next_test_picture(result: LoopResult) -> Picture | None:
@@ -292,76 +284,21 @@ def next_test_picture(result: LoopResult) -> Picture | None:
     best = following.best
     if best is None:
         return None
-    with figure(1, 1, width=7.0, height=3.2) as (drawing, axes):
-        panel = axes[0, 0]
-        lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
-        for i, (effects, probability, curve) in enumerate(lines):
-            panel.plot(
-                best.samples,
-                curve,
-                **(RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE),
-                lw=2.0 if i == 0 else 1.4,
-                label=f"{effects_title(effects)} ({percent(probability)})",
-            )
-        unit = "" if best.quantity == "strain" else " (Pa)"
-        panel.set_ylabel(FIGURE_SYMBOLS[best.quantity] + unit)
-        panel.set_xlabel("shear rate (1/s)" if best.is_flow_curve else "time (s)")
-        if best.is_flow_curve or best.quantity in MODULI:
-            panel.set_xscale("log")
-            panel.set_yscale("log")
-        legend_above(drawing, axes, columns=1)
-        return picture(
-            drawing,
-            "next_test",
-            f"What to measure next: {best.title}. Curves: predictions of the explanations, all of "
-            f"which fit these data. Assumed noise: {percent(following.noise)}.",
-        )
-
-
-_MOST_RIVALS, _COLUMNS = 6, 3
-
-
-def rivals_picture(result: LoopResult) -> Picture | None:
-    """Return the residual against time of each explanation; None where there is one alone.
-
-    The likeliest are shown, on one scale.
-    """
-    told = result.explanations.likeliest_first
-    records = [r for r in result.records if r.is_transient and r.by_explanation is not None]
-    if len(told) < 2 or not records:
-        return None
-    shown = told[:_MOST_RIVALS]
-    chosen = result.explanations.holding([stage.effect for stage in result.stages])
-    with panels_of(len(shown), _COLUMNS, width=10.0, height=2.1) as (drawing, axes, panels):
-        limit = 0.0
-        for place, (panel, one) in enumerate(zip(panels, shown, strict=True)):
-            for record in records:
-                assert record.by_explanation is not None
-                size = rms(record.measured) or 1.0
-                relative = 100.0 * (record.by_explanation[place] - record.measured) / size
-                panel.plot(
-                    record.time, relative, lw=0.9, alpha=0.8,
-                    color=HELD_COLOUR if record.held_out else FIT_COLOUR,
-                    label="held out" if record.held_out else "fitted",
-                )  # fmt: skip
-                limit = max(limit, float(np.percentile(np.abs(relative), 98)))
-            names = "\n+ ".join(map(effect_title, one.effects)) or "your model"
-            found = ", found by the search" if one is chosen else ""
-            panel.set_title(f"{names}\n({percent(one.probability)}{found})", fontsize=8)
-            panel.axhline(0.0, color=INK, lw=0.6)
-            if all(runs_through_decades(r.time, r.rate) for r in records):
-                make_logarithmic(panel.xaxis)
-        for panel in panels:
-            panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
-        for panel in panels[-axes.shape[1] :]:  # below which there is none
-            panel.set_xlabel("time (s)")
-        for panel in axes[:, 0]:
-            panel.set_ylabel("residual (% of rms)")
-        legend_above(drawing, axes)
-        left = f" The {_MOST_RIVALS} likeliest of {len(told)}." if len(told) > _MOST_RIVALS else ""
-        return picture(
-            drawing,
-            "rivals",
-            "Residual of every run for each explanation, over the run's root-mean-square, on one "
-            "scale. Above each panel: its effects and their probability." + left,
-        )
+    curves = []
+    lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
+    for i, (effects, probability, curve) in enumerate(lines):
+        style = RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE
+        label = f"{effects_title(effects)} ({percent(probability)})"
+        curves.append((best.samples, curve, {**style, "lw": 1.4 if i else 2.0, "label": label}))
+    unit = "" if best.quantity == "strain" else " (Pa)"
+    settings = {
+        "ylabel": FIGURE_SYMBOLS[best.quantity] + unit,
+        "xlabel": "shear rate (1/s)" if best.is_flow_curve else "time (s)",
+    }
+    if best.is_flow_curve or best.quantity in MODULI:
+        settings |= {"xscale": "log", "yscale": "log"}
+    caption = (
+        f"What to measure next: {best.title}. Curves: predictions of the explanations, all of "
+        f"which fit these data. Assumed noise: {percent(following.noise)}."
+    )
+    return row_of_panels("next_test", caption, [Panel(curves, settings)], 7.0, 3.2, columns=1)

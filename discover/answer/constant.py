@@ -1,0 +1,226 @@
+"""A constant in words: its letter, the digits that its interval leaves it, and the bound of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from discover.equations.spelling.plain_signs import plain as plain_signs
+from discover.words import LEVEL, estimate, interval, readable, significant
+
+Span = tuple[float, float]
+"""Least and largest value."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """Constant of a law or of an effect.
+
+    `value`, `ci95`, `unit`: with its 95 % interval, None for one that was declared; ``"1"`` if
+        dimensionless.
+    """
+
+    name: str  # as studies spell it, such as ``alpha``
+    value: float
+    ci95: Span | None = None
+    unit: str = "1"
+    determined: bool = True  # whether the data determine it
+    letter: str = ""  # LaTeX, as the equation of its effect has it
+    meaning: str = ""  # in a few words, where its letter is not one of the field
+    end: Literal["", "low", "high"] = ""  # of its physical range, where the value is there
+
+    @property
+    def is_term(self) -> bool:
+        """Whether it is the coefficient of a term of the library."""
+        return "sigma" in self.name or "gammadot" in self.name
+
+    @property
+    def reciprocal(self) -> "Constant":
+        """Its reciprocal, where the letter is that of one over it: γ̇c rather than 1/γ̇c."""
+        ends = self.ci95 or (self.value, self.value)
+        if not self.letter.startswith("1/") or self.unit not in _RECIPROCAL or min(ends) <= 0.0:
+            return self
+        low, high = ends
+        return replace(
+            self,
+            value=1.0 / self.value,
+            ci95=None if self.ci95 is None else (1.0 / high, 1.0 / low),
+            unit=_RECIPROCAL[self.unit],
+            letter=self.letter.removeprefix("1/"),
+            end=_OTHER_END[self.end],
+        )
+
+    @property
+    def symbol(self) -> str:
+        """Letter of the field, such as α."""
+        if self.is_term:
+            return readable(self.name)
+        name = self.name.rpartition(".")[2]
+        if name in _SYMBOLS:
+            return _SYMBOLS[name][0]
+        letter = self.reciprocal.letter
+        return plain_signs(letter) if letter else readable(name.replace("_", " "))
+
+    @property
+    def said(self) -> str:
+        """What it is, in a few words; empty of a term, and where nobody said."""
+        name = self.name.rpartition(".")[2]
+        said = self.meaning or _SYMBOLS.get(name, ("", ""))[1]
+        return said.removeprefix("inverse ") if self.reciprocal is not self else said
+
+    @property
+    def number(self) -> str:
+        """Value to as many digits as the interval leaves it, with its unit.
+
+        Of what is not determined that of the best fit, which goes with the other constants.
+        """
+        if not self.determined:
+            return f"{significant(self.reciprocal.value, 2)}{self.reciprocal._unit}"
+        if (other := self.reciprocal) is not self:
+            return other.number
+        return f"{self._plain(self.value)}{self._unit}"
+
+    @property
+    def interval(self) -> str:
+        """95 % interval, or a dash, or that it is not determined."""
+        if not self.determined:
+            return "not determined alone"
+        if (other := self.reciprocal) is not self:
+            return other.interval
+        if self.bound:
+            return self.bound
+        low, high = self.ci95 or (math.nan, math.nan)
+        first, last = self._rounded(low), self._rounded(high)
+        if first and last:
+            return f"{first} to {last}" if low < 0.0 else f"{first}–{last}"
+        return interval(self.ci95)
+
+    @property
+    def digits(self) -> int:
+        """Significant digits of the value in an equation: those of the interval, three at most."""
+        if not self.has_interval or self.ci95 is None or not self.value:
+            return 3
+        of_width = math.floor(math.log10(self.ci95[1] - self.ci95[0]))
+        return min(max(2 + math.floor(math.log10(abs(self.value))) - of_width, 1), 3)
+
+    @property
+    def _unit(self) -> str:
+        """Unit as it stands behind a number."""
+        return "" if self.unit in ("", "1") else f" {self.unit.replace('^2', '²')}"
+
+    def _plain(self, value: float) -> str:
+        """Return a number of this constant without its unit."""
+        return self._rounded(value) or estimate(value, self.ci95)
+
+    def _rounded(self, value: float) -> str:
+        """Return a number to two digits of the interval's width; empty where it needs a power.
+
+        And to three digits in all, unless the ends of the interval would be one number.
+        """
+        if self.ci95 is None or not 0.0 < (width := self.ci95[1] - self.ci95[0]) < math.inf:
+            return ""
+        largest = max(map(abs, (*self.ci95, self.value)))
+        of_width, of_value = (math.floor(math.log10(size)) for size in (width, largest))
+        decimals = min(1 - of_width, max(2 - of_value, -of_width))
+        if decimals < 0 and value:  # a small number beside a large one keeps two digits
+            decimals = min(max(decimals, 1 - math.floor(math.log10(abs(value)))), 0)
+        if not 1e-3 <= largest < 1e5 or decimals > 6:
+            return ""
+        text = f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
+        if self.ci95[0] > 0.0 and not float(text):  # small, but not zero
+            return significant(value, 1)
+        return text.replace("-", _MINUS)
+
+    @property
+    def has_interval(self) -> bool:
+        """Whether it was fitted, so that its value is uncertain."""
+        return self.determined and self.ci95 is not None and self.ci95[0] < self.ci95[1]
+
+    @property
+    def text(self) -> str:
+        """Symbol, value and interval."""
+        return self.with_interval(f"{LEVEL} ")
+
+    def with_interval(self, level: str) -> str:
+        """Return symbol, value and interval, with what stands before the interval."""
+        if not self.determined:
+            return f"{self.symbol} not determined"
+        return f"{self.symbol}{'' if self.bound else ' ='} {self.measured(level)}"
+
+    def measured(self, level: str) -> str:
+        """Return value and interval, with what stands before the interval.
+
+        Of a value near an end of its interval the interval comes first: alone it would look like a
+        slip, and no other value goes with the other constants.
+        """
+        if not self.has_interval:
+            return self.number
+        if not self.bound and not self.is_skewed:
+            return f"{self.number} ({level}{self.interval})"
+        level = f"{level.strip()}, " if level.strip() else ""
+        return f"{self.interval}{self.reciprocal._unit} ({level}best fit {self.number})"
+
+    @property
+    def is_skewed(self) -> bool:
+        """Whether the value, the best of all constants together, is near an end of its interval.
+
+        The interval is over all laws that fit as well, in which it may be far from that value.
+        """
+        one = self.reciprocal  # as it is told
+        if not one.has_interval or one.ci95 is None:
+            return False
+        low, high = one.ci95
+        return not _NEAR_END < (one.value - low) / (high - low) < 1.0 - _NEAR_END
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether its interval spans more than a decade."""
+        return (
+            self.has_interval
+            and self.ci95 is not None
+            and 0.0 < _DECADE * self.ci95[0] < self.ci95[1]
+        )
+
+    @property
+    def bound(self) -> str:
+        """Bound that remains of a value at an end of its physical range; empty of one inside.
+
+        Also of a value at an end of an interval of decades, the other end of which says no more.
+        """
+        one = self.reciprocal
+        if one.ci95 is None or not (one.at_limit or one.is_wide):
+            return ""
+        low, high = one.ci95
+        if not one.at_limit:
+            share = math.log(one.value / low) / math.log(high / low)
+            if _NEAR_END < share < 1.0 - _NEAR_END:
+                return ""
+        sign, value = ("≥", low) if one.end == "high" else ("≤", high)
+        return f"{sign} {one._plain(value)}"
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether its value is at an end of what is physical."""
+        return bool(self.end) and self.has_interval
+
+
+_MINUS = "−"
+_OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
+_DECADE = 10.0
+_NEAR_END = 0.1
+"""Share of an interval at its ends in which a value is not near its middle."""
+_RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
+_SYMBOLS = {
+    "modulus_Pa": ("G", "modulus"),
+    "relaxation_time_s": ("λ", "relaxation time"),
+    "modulus_factor": ("G/G_0", "moduli of the sweep times"),
+    "relaxation_time_factor": ("λ/λ_0", "times of the sweep times"),
+    "eta_s": ("η_s", "Newtonian viscosity"),
+    "L2": ("L²", "extensibility"),
+    "yield_stress_Pa": ("τ_y", "yield stress"),
+    "consistency_Pa_sn": ("K", "consistency"),
+    "flow_index": ("n", "flow index"),
+    "viscosity_Pa_s": ("η", "viscosity"),
+    "elastic_modulus_Pa": ("G", "modulus"),
+}
+"""Symbol and meaning of constants that no effect has."""

@@ -1,0 +1,132 @@
+"""Parts of an answer: modes, what is suspected of the instrument, range, errors."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+from discover.answer.constant import Constant, Span
+from discover.words import LEVEL, effect_title
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Relaxation mode."""
+
+    modulus_Pa: float
+    relaxation_time_s: float
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Effect of the instrument or of the flow, which is no part of the fluid."""
+
+    effect: str  # name as studies spell it
+    constants: tuple[Constant, ...] = ()  # its constants with their intervals, the amplitude first
+
+    @property
+    def amplitude(self) -> Constant | None:
+        """Its first constant, a pure number as a percentage."""
+        if not self.constants or self.constants[0].unit != "1":
+            return self.constants[0] if self.constants else None
+        one = self.constants[0]
+        ends = None if one.ci95 is None else (100.0 * one.ci95[0], 100.0 * one.ci95[1])
+        meaning = "" if one.meaning == one.name.replace("_", " ") else one.meaning
+        return replace(one, value=100.0 * one.value, ci95=ends, unit="%", meaning=meaning)
+
+    @property
+    def text(self) -> str:
+        """Name and amplitude, with its interval."""
+        title, amplitude = effect_title(self.effect), self.amplitude
+        if amplitude is None:
+            return title
+        if not amplitude.determined:
+            return f"{title} not determined"
+        if not self.is_established:
+            return f"{title} {amplitude.number} ({LEVEL} {amplitude.interval}), not established"
+        if amplitude.bound or amplitude.is_skewed or not amplitude.has_interval:
+            return f"{title} {amplitude.measured(f'{LEVEL} ')}"
+        share = f" {amplitude.meaning}" if amplitude.unit == "%" and amplitude.meaning else ""
+        return f"{title} {amplitude.number}{share} ({LEVEL} {amplitude.interval})"
+
+    @property
+    def is_established(self) -> bool:
+        """Whether the interval of its amplitude excludes zero."""
+        if not self.constants:
+            return True
+        first = self.constants[0]
+        return first.determined and (first.ci95 is None or first.ci95[0] * first.ci95[1] > 0.0)
+
+    @property
+    def is_separate(self) -> bool:
+        """Whether the runs give it a size of its own."""
+        return self.is_established and not any(one.at_limit for one in self.constants[:1])
+
+
+@dataclass(frozen=True)
+class Range:
+    """Flows in which a law was fitted or tested.
+
+    `weissenberg`, `deborah`: with the mean relaxation time; None where there is none.
+    `strain`, `rate_1_s`: largest strain and rate of the runs, least to largest; None where not
+        known.
+    `by_temperature`: of runs that were shifted to one temperature, the flows as they were measured,
+        by temperature in °C.
+    `flows`: kinds of flow: ``shear``, ``uniaxial``, ``planar``, ``biaxial``.
+    """
+
+    weissenberg: Span | None = None
+    deborah: Span | None = None
+    strain: Span | None = None
+    rate_1_s: Span | None = None
+    frequency_rad_s: Span | None = None  # of sweeps, which have no rate of their own
+    flows: tuple[str, ...] = ("shear",)
+    oscillates: bool = True  # whether De is λω; else λ over the length of a run
+    by_temperature: Mapping[float, "Range"] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the range as result files hold it."""
+        own = {key: one for key, one in vars(self).items() if key not in _NOT_WRITTEN}
+        measured = {f"{at:g}": one.to_json() for at, one in self.by_temperature.items()}
+        return own | {"by_temperature_C": measured} if measured else own
+
+
+_NOT_WRITTEN = ("oscillates", "by_temperature")
+
+
+@dataclass(frozen=True)
+class ExpectedError:
+    """Relative error that a prediction of one quantity is expected to have.
+
+    `inside`, `beyond`: inside the rates of the data and beyond them; None where unknown.
+    `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
+    `missing`: what stands in place of a number that is unknown.
+    `note`: why it is unknown, or on what it rests: ``not measured; constants alone``.
+    """
+
+    inside: float | None = None
+    beyond: float | None = None
+    beyond_at: str = ""
+    missing: Literal["not measured", "not determined"] = "not measured"
+    note: str = ""
+    is_measured: bool = True  # whether records of this quantity tell it, or only the law does
+    is_residual: bool = False  # of fitted runs, which is no error to expect
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a number."""
+        return self.inside is not None or self.beyond is not None
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """Size of what no law describes, over the root mean square of the records, without noise.
+
+    `size`, `ci95`: of all runs in the range.
+    `grows_with_rate`: power of the shear rate with which it grows; None where the data do not tell.
+    """
+
+    size: float
+    ci95: Span
+    by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
+    grows_with_rate: float | None = None
+    unseen: str = ""  # ``unseen runs`` where it is the error of such; empty: of fitted ones
