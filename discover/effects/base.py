@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from tensor_library.algebra import Symmetric
@@ -94,6 +95,9 @@ class AbstractEffect(ABC):
     acts_on_steady_states: ClassVar[bool] = False
     """Of an effect of the instrument or a state: whether it changes what is steady or periodic,
     sample by sample, without regard to time or strain."""
+    takes_numpy: ClassVar[bool] = False
+    """Of an effect on a rate or a signal: whether it also takes arrays of NumPy, which of many
+    vectors and runs have axes of vectors, runs and times; each value those of vectors and ones."""
 
 
 @dataclass(frozen=True)
@@ -190,6 +194,11 @@ class StateEffect(ConstitutiveEffect):
         return jnp.ones(())
 
 
+Signal = Float[Array | np.ndarray, "... n"]
+OfRun = Float[Array | np.ndarray, "..."]
+Values = Float[Array | np.ndarray, "p ..."]
+
+
 @dataclass(frozen=True)
 class Record:
     """Signal of one run on increasing times in s, from 0 or from a steady flow before it.
@@ -199,32 +208,35 @@ class Record:
     gap.
     """
 
-    times: Float[Array, " n"]
-    rate: Float[Array, " n"]  # felt by the fluid, in 1/s, shape (n,)
-    stress: Float[Array, " n"]  # shear stress in Pa, shape (n,)
-    clock_factor: Float[Array, ""]  # time on the instrument's clock is ``times / clock_factor``
-    strain_before: Float[Array, ""] | float = 0.0
-    tool_rate: Float[Array, " n"] = None  # type: ignore[assignment]  # set below
+    times: Signal
+    rate: Signal  # felt by the fluid, in 1/s
+    stress: Signal  # shear stress in Pa
+    clock_factor: OfRun  # time on the instrument's clock is ``times / clock_factor``
+    strain_before: OfRun | float = 0.0
+    tool_rate: Signal = None  # type: ignore[assignment]  # set below
 
     def __post_init__(self):
         if self.tool_rate is None:
             object.__setattr__(self, "tool_rate", self.rate)
 
     @property
-    def instrument_times(self) -> Float[Array, " n"]:
+    def instrument_times(self) -> Signal:
         """Times on the instrument's clock, in s."""
         return self.times / self.clock_factor
 
     @property
-    def total_strain(self) -> Float[Array, " n"]:
+    def total_strain(self) -> Signal:
         """Strain of the sample since its first run, without regard to sign, at each time.
 
         A steady flow before t = 0 does not count.
         """
-        size = jnp.abs(self.rate)
+        of: Any = self.rate.__array_namespace__()
+        size = of.abs(self.rate)
         # a flow before t = 0 lasts as long as the simulation needs, not as it did in the experiment
-        steps = 0.5 * (size[1:] + size[:-1]) * jnp.diff(jnp.maximum(self.times, 0.0))
-        return self.strain_before + jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])
+        width = of.diff(of.maximum(self.times, 0.0))
+        strain = of.cumsum(0.5 * (size[..., 1:] + size[..., :-1]) * width, axis=-1)
+        start = of.zeros_like(strain[..., :1])
+        return self.strain_before + of.concatenate([start, strain], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -239,12 +251,7 @@ class KinematicEffect(AbstractEffect):
     shapes_command: bool = False
     kind: ClassVar[Kind] = "kinematic"
 
-    def felt_rate(
-        self,
-        values: Float[Array, " p"],
-        instrument_times: Float[Array, " n"],
-        shear_rate: Float[Array, " n"],
-    ) -> Float[Array, " n"]:
+    def felt_rate(self, values: Values, instrument_times: Signal, shear_rate: Signal) -> Signal:
         """Return the shear rate felt in 1/s from the one without this effect, linear between times.
 
         `instrument_times` in s on the instrument's clock, from the start of the flow; at rest
@@ -302,7 +309,7 @@ class SignalEffect(AbstractEffect):
     of_force: ClassVar[bool] = False
 
     @abstractmethod
-    def recorded_stress(self, values: Float[Array, " p"], record: Record) -> Float[Array, " n"]:
+    def recorded_stress(self, values: Values, record: Record) -> Signal:
         """Return the stress recorded, from the one that would be recorded without this effect."""
 
     def response(

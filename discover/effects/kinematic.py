@@ -1,28 +1,43 @@
 """Effects on the deformation that the fluid felt."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.linalg.lapack import dtbtrs
 from scipy.special import roots_sh_jacobi
 
-from discover.effects.base import EffectParameter, KinematicEffect, RadialAverage, SeriesElement
+from discover.effects.base import (
+    EffectParameter,
+    KinematicEffect,
+    OfRun,
+    RadialAverage,
+    SeriesElement,
+    Signal,
+)
 
 
-def first_order_lag(
-    times: Float[Array, " n"], values: Float[Array, " n"], time_constant: Float[Array, ""]
-) -> Float[Array, " n"]:
+def first_order_lag(times: Signal, values: Signal, time_constant: OfRun) -> Signal:
     """Return y with τ y' + y = x, from y = 0; exact for x linear between times.
 
     `times`, `time_constant` (τ) in s. At τ = 0, y = x, also at the first time.
     """
+    of: Any = values.__array_namespace__()
     active = time_constant > 0.0
-    safe = jnp.where(active, time_constant, 1.0)
-    step = jnp.diff(times) / safe
-    decay = jnp.exp(-step)
+    safe = of.where(active, time_constant, 1.0)
+    step = of.diff(times) / safe
+    decay = of.exp(-step)
     # weights of the two ends of an interval: ∫ e^{-(h-s)} (linear) ds
-    mean = -jnp.expm1(-step) / step
-    forcing = values[1:] * (1.0 - mean) + values[:-1] * (mean - decay)
+    mean = -of.expm1(-step) / step
+    forcing = values[..., 1:] * (1.0 - mean) + values[..., :-1] * (mean - decay)
+    carried = _carried_in_numpy if isinstance(values, np.ndarray) else _carried
+    return of.where(active, carried(decay, forcing), values)
+
+
+def _carried(decay: Float[Array, " m"], forcing: Float[Array, " m"]) -> Float[Array, " n"]:
+    """Return y from zero on, with y' = decay · y + forcing from one time to the next."""
 
     def onward(lagged, interval):
         decay, forcing = interval
@@ -31,14 +46,27 @@ def first_order_lag(
 
     # one after another: half of the time of a scan in parallel, and a sixth of its compiling
     _, lagged = jax.lax.scan(onward, jnp.zeros(()), (decay, forcing))
-    lagged = jnp.concatenate([jnp.zeros(1), lagged])
-    return jnp.where(active, lagged, values)
+    return jnp.concatenate([jnp.zeros(1), lagged])
+
+
+def _carried_in_numpy(
+    decay: Float[np.ndarray, "... m"], forcing: Float[np.ndarray, "... m"]
+) -> Float[np.ndarray, "... n"]:
+    below = np.broadcast_to(-decay, forcing.shape).reshape(-1, forcing.shape[-1])
+    lagged = np.zeros((*forcing.shape[:-1], forcing.shape[-1] + 1))
+    lagged[..., 1:] = forcing
+    # the matrix of the recursion has ones on its diagonal, and one line below it
+    bands = np.ones((2, lagged.shape[-1]))
+    for row, own in zip(lagged.reshape(-1, lagged.shape[-1]), below, strict=True):
+        bands[1, :-1] = own
+        row[:] = dtbtrs(bands, row[:, None], uplo="L", diag="U")[0][:, 0]
+    return lagged
 
 
 class RateGain(KinematicEffect):
     """The rate felt is (1 + g) times the commanded one."""
 
-    acts_on_steady_states = True
+    acts_on_steady_states = takes_numpy = True
 
     def felt_rate(self, values, instrument_times, shear_rate):
         """Return (1 + g_r) γ̇."""
@@ -100,6 +128,8 @@ PARALLEL_PLATES = RadialAverage(
 
 class RateRiseTime(KinematicEffect):
     """The rate felt follows the commanded one with a first-order lag on the instrument's clock."""
+
+    takes_numpy = True
 
     def felt_rate(self, values, instrument_times, shear_rate):
         """Return the lagged rate: t_m γ̇_felt' + γ̇_felt = γ̇, from rest."""

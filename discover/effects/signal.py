@@ -1,6 +1,7 @@
 """Effects that change what was recorded."""
 
 import jax.numpy as jnp
+import numpy as np
 
 from discover.effects.base import EffectParameter, SignalEffect
 from discover.effects.kinematic import first_order_lag
@@ -9,11 +10,12 @@ from discover.effects.kinematic import first_order_lag
 class BearingFriction(SignalEffect):
     """A torque against the motion, of constant size, is recorded with the stress (Coulomb)."""
 
-    acts_on_steady_states = True
+    acts_on_steady_states = takes_numpy = True
 
     def recorded_stress(self, values, record):
         """Return σ + σ_f sign(γ̇), with the rate of the tool, whatever the fluid feels of it."""
-        return record.stress + values[0] * jnp.sign(record.tool_rate)
+        sign = record.tool_rate.__array_namespace__().sign
+        return record.stress + values[0] * sign(record.tool_rate)
 
 
 BEARING_FRICTION = BearingFriction(
@@ -42,10 +44,13 @@ class EdgeFracture(SignalEffect):
     [Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929].
     """
 
+    takes_numpy = True
+
     def recorded_stress(self, values, record):
         """Return σ exp(−k_e max(0, γ_total − γ_c))."""
-        beyond = jnp.maximum(record.total_strain - values[1], 0.0)
-        return record.stress * jnp.exp(-values[0] * beyond)
+        of = record.stress.__array_namespace__()
+        beyond = of.maximum(record.total_strain - values[1], 0.0)
+        return record.stress * of.exp(-values[0] * beyond)
 
 
 EDGE_FRACTURE = EdgeFracture(
@@ -82,14 +87,17 @@ _JUMP = 1e-9
 class InstrumentInertia(SignalEffect):
     """The stress recorded contains the inertia of the tool; negative if over-corrected."""
 
+    takes_numpy = True
+
     def recorded_stress(self, values, record):
         """Return σ + I dγ̇/dt, with the rate of the tool, whatever the fluid feels of it."""
-        step = jnp.diff(record.instrument_times)
-        shortest = _JUMP * (record.instrument_times[-1] - record.instrument_times[0])
-        slope = jnp.where(step > shortest, jnp.diff(record.tool_rate) / step, 0.0)
+        of, times = record.tool_rate.__array_namespace__(), record.instrument_times
+        step = of.diff(times)
+        shortest = _JUMP * (times[..., -1:] - times[..., :1])
+        slope = of.where(step > shortest, of.diff(record.tool_rate) / step, 0.0)
         # slope at the points, from the intervals at both sides
-        inside = 0.5 * (slope[1:] + slope[:-1])
-        at_points = jnp.concatenate([slope[:1], inside, slope[-1:]])
+        inside = 0.5 * (slope[..., 1:] + slope[..., :-1])
+        at_points = of.concatenate([slope[..., :1], inside, slope[..., -1:]], axis=-1)
         # the rate is per second of material time; the tool moves on the instrument's clock
         return record.stress + values[0] * record.clock_factor * at_points
 
@@ -120,6 +128,8 @@ INSTRUMENT_INERTIA = InstrumentInertia(
 class StressDrift(SignalEffect):
     """A stress that grows linearly with instrument time is added to the one recorded."""
 
+    takes_numpy = True
+
     def recorded_stress(self, values, record):
         """Return σ + a t."""
         return record.stress + values[0] * record.instrument_times
@@ -145,7 +155,7 @@ STRESS_DRIFT = StressDrift(
 class StressGain(SignalEffect):
     """The stress recorded is (1 + g_s) times the true one."""
 
-    acts_on_steady_states = True
+    acts_on_steady_states = takes_numpy = True
 
     def recorded_stress(self, values, record):
         """Return (1 + g_s) σ."""
@@ -194,7 +204,7 @@ NORMAL_FORCE_GAIN = NormalForceGain(
 class StressOffset(SignalEffect):
     """A constant is added to the stress recorded."""
 
-    acts_on_steady_states = True
+    acts_on_steady_states = takes_numpy = True
 
     def recorded_stress(self, values, record):
         """Return σ + σ₀."""
@@ -221,10 +231,16 @@ STRESS_OFFSET = StressOffset(
 class TimeDelay(SignalEffect):
     """The stress recorded is the true one some time earlier, on the instrument's clock."""
 
+    takes_numpy = True
+
     def recorded_stress(self, values, record):
         """Return σ(t − δ), which is zero before the flow starts."""
         earlier = record.instrument_times - values[0]
-        return jnp.interp(earlier, record.instrument_times, record.stress, left=0.0)
+        if not isinstance(record.stress, np.ndarray):
+            return jnp.interp(earlier, record.instrument_times, record.stress, left=0.0)
+        each = np.broadcast_arrays(earlier, record.instrument_times, record.stress)
+        rows = zip(*(of.reshape(-1, of.shape[-1]) for of in each), strict=True)
+        return np.stack([np.interp(*row, left=0.0) for row in rows]).reshape(earlier.shape)
 
     def response(self, values, frequency):
         """Return exp(−iωδ)."""
@@ -250,6 +266,8 @@ TIME_DELAY = TimeDelay(
 
 class TransducerLag(SignalEffect):
     """The stress recorded follows the true one with a first-order lag on the instrument's clock."""
+
+    takes_numpy = True
 
     def recorded_stress(self, values, record):
         """Return the lagged stress: t_f σ_rec' + σ_rec = σ, from rest."""

@@ -1,4 +1,4 @@
-"""Predictions of parameter vectors: rates and signal in JAX, and the code that follows modes."""
+"""Predictions of parameter vectors: rates and signal, and the code that follows modes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -106,10 +106,14 @@ class Program:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
         kernel = code_of(Kernel, *given, **choices)
-        return SideBySide(self.fluid, kernel, self._rates, self._at_samples, made_from)
+        return SideBySide(self.fluid, kernel, self._rates, self._distorted, made_from)
 
-    def _rates(self, theta, present, run: TransientFlows):
-        """Return the felt rate at half steps and the tool's at steps, by the effects present."""
+    def _rates(self, theta, present, run):
+        """Return the felt rate at half steps and the tool's at steps, by the effects present.
+
+        Here and in `_distorted` one vector and run, or in arrays of NumPy many: vectors and runs
+        are then the first axes of all that follows time, and the last of vectors.
+        """
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -132,21 +136,24 @@ class Program:
             return rate
 
         upstream = shaped(rate, self._upstream)
-        return shaped(upstream, self._downstream), upstream[::2]
+        return shaped(upstream, self._downstream), upstream[..., ::2]
 
     def _if_present(self, theta, present, effect: AbstractEffect, change: Callable, value):
         """Return what an effect makes of a value, which stays as it is without the effect."""
         amplitude = theta[self.fluid.slices[effect.name].start]
+        is_present = present[self._number[effect.name]]
+        if isinstance(theta, np.ndarray):
+            return np.where(amplitude != 0.0, change(value), value) if is_present else value
         return jax.lax.cond(
-            present[self._number[effect.name]],
+            is_present,
             lambda value: jnp.where(amplitude != 0.0, change(value), value),
             lambda value: value,
             value,
         )
 
-    def _at_samples(self, theta, present, run: TransientFlows, stress, felt, tool_rate):
-        """Return the recorded stress at the samples, of that at all steps before the signal."""
-        times = run.times[::2]
+    def _distorted(self, theta, present, run, stress, felt, tool_rate):
+        """Return the recorded stress at all steps, of that before the signal."""
+        times = run.times[..., ::2]
         for effect in self._signal:
 
             def distorted(stress, effect=effect):
@@ -155,7 +162,7 @@ class Program:
                 return self._as_recorded(theta, effect, record, run.kinematics)
 
             stress = self._if_present(theta, present, effect, distorted, stress)
-        return stress[run.sample_index]
+        return stress
 
     def _steady_rates(self, theta, present, run: SteadyFlows):
         """Return the rates of a flow curve that the fluid feels where nothing slips."""
@@ -289,8 +296,9 @@ class Program:
     def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
         """Return the stress after an effect on the signal of torque or force, where it is that."""
         changed = effect.recorded_stress(self.fluid.values(theta, effect), record)
-        of_torque = True if flow is None else flow.records_torque
-        return jnp.where(of_torque != effect.of_force, changed, record.stress)
+        if flow is None:
+            return record.stress if effect.of_force else changed
+        return jnp.where(flow.records_torque != effect.of_force, changed, record.stress)
 
 
 program_of = lru_cache(maxsize=16)(Program)

@@ -201,6 +201,30 @@ def test_a_lag_much_shorter_than_the_samples_leaves_the_signal_alone_and_stays_d
     assert np.all(np.isfinite(slope))
 
 
+@pytest.mark.parametrize("effect", [e for e in NAMED if e.takes_numpy], ids=lambda e: e.name)
+def test_arrays_of_numpy_of_many_vectors_and_runs_give_what_jax_gives_of_each(effect):
+    rng = np.random.default_rng(0)
+    values = 0.3 * (1.0 + rng.random((2, len(effect.parameters))))
+    times = np.cumsum(rng.random((3, 40)), axis=1)
+    clock, before = np.array([1.0, 0.8, 1.1]), np.array([0.0, 2.0, 5.0])
+    stress, rate, of_tool = rng.normal(size=(3, 2, 3, 40))
+
+    def of_all(times, clock, before, stress, rate, of_tool, values):
+        if isinstance(effect, KinematicEffect):
+            return effect.felt_rate(values, times / clock, rate)
+        return effect.recorded_stress(values, Record(times, rate, stress, clock, before, of_tool))
+
+    given = (times, clock[:, None], before[:, None], stress, rate, of_tool)
+    found = of_all(*given, values.T[..., None, None])
+    assert isinstance(found, np.ndarray)
+    of_runs = jax.vmap(of_all, (0, 0, 0, 0, 0, 0, None))
+    expected = jax.vmap(of_runs, (None, None, None, 0, 0, 0, 0))(
+        times, clock, before, stress, rate, of_tool, values
+    )
+    # the same sums in another order
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
 def test_signal_effects_run_on_the_clock_of_the_instrument():
     slow, fast = record(1.0), record(10.0)
     drift = make_effect("stress_drift")

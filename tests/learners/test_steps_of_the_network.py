@@ -50,3 +50,14 @@ def test_a_start_that_runs_away_is_told_by_its_norm():
     descent, norms = descended(np.array([0.0, 3.0]), 2)
     assert not np.any(np.isfinite(norms))
     assert np.array_equal(descent.best, [0.0, 3.0])
+
+
+def test_residuals_alone_reject_a_trial_where_the_derivatives_would_be_of_no_use():
+    expected, _ = descended(START, 60)
+    descent, with_derivatives = Steps(START), 0
+    for _ in range(60):
+        if not descent.goes_up(valley(descent.trial).rows):
+            descent.take(valley(descent.trial))
+            with_derivatives += 1
+    assert np.array_equal(descent.best, expected.best)
+    assert with_derivatives < 60

@@ -10,7 +10,12 @@ from independent import RoliePoly, oscillation, start_up
 import discover as dc
 from discover.laws import Fluid
 from discover.learners.tbnn_ude.ensemble import member_misfits
-from discover.learners.tbnn_ude.evidence import endures, posterior_draws, surprises
+from discover.learners.tbnn_ude.evidence import (
+    at_twice_the_rate,
+    endures,
+    posterior_draws,
+    surprises,
+)
 from discover.learners.tbnn_ude.least_squares import (
     least_variation,
     parts,
@@ -112,9 +117,9 @@ def test_a_law_that_runs_away_at_twice_the_rate_is_taken_only_for_want_of_anothe
         law,
         (jnp.zeros(8).at[3].set(-0.05), jnp.zeros(8)),
     )
-    assert endures(law, own)
+    assert endures(law, at_twice_the_rate(own))
     assert np.all(np.isfinite(trajectories(wild, own).states))
-    assert not endures(wild, own)
+    assert not endures(wild, at_twice_the_rate(own))
     values = surprises([law, wild], own)
     assert np.isfinite(values[0])
     assert np.isinf(values[1])

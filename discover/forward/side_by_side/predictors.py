@@ -115,7 +115,7 @@ class LanePredictor:
         eight vectors, the last again until there are eight, and the parts they need.
         """
         flags = self._flags.of(thetas)
-        order = np.lexsort([*keys, *flags.T])
+        order = np.lexsort([*keys, *np.packbits(flags, axis=1).T])
 
         def found(trials: np.ndarray) -> np.ndarray:
             lanes = trials[in_whole_eights(len(trials))]

@@ -109,7 +109,8 @@ class Flags:
 
     def of(self, thetas: np.ndarray) -> np.ndarray:
         """Return which parts each vector needs, shape (trials, flags); the last is left unset."""
-        return (thetas != 0.0) @ self._set_by > 0.0
+        # of truths NumPy has no fast product
+        return (thetas != 0.0).astype(float) @ self._set_by > 0.0
 
 
 def beside_modes(fluid: AugmentedFluid) -> list[ConstitutiveEffect]:

@@ -1,6 +1,8 @@
 """Transients at a given rate of many vectors of parameters, eight side by side.
 
-JAX shapes the rate and distorts the signal, where a vector asks for it.
+Where a vector asks for it NumPy shapes the rate and distorts the signal, of all vectors and runs
+together; JAX does where an effect takes its arrays alone, for other flows than shear, and for steps
+of the rate at instants that are fitted.
 """
 
 from collections.abc import Callable
@@ -43,6 +45,46 @@ _OF_RUNS = (
 )  # fmt: skip
 
 
+class _Signals(NamedTuple):
+    """Runs as effects on rates and signals take them, with an axis of runs, in arrays of NumPy.
+
+    `sample`: positions of the samples among step ends. The others as of `TransientFlows`.
+    """
+
+    times: np.ndarray
+    commanded_rate: np.ndarray
+    clock_factor: np.ndarray
+    strain_before: np.ndarray
+    sample: np.ndarray
+    kinematics: None = None
+    steps: None = None
+
+    @classmethod
+    def of(cls, part: TransientFlows) -> "_Signals":
+        """Return all runs of a part."""
+        times, rate, sample, clock, strain = map(
+            np.asarray,
+            (part.times, part.commanded_rate, part.sample_index, part.clock_factor,
+             part.strain_before),
+        )  # fmt: skip
+        return cls(times, rate, clock[:, None], strain[:, None], sample)
+
+    def of_first(self, runs: int) -> "_Signals":
+        """Return the first runs, which are no padding."""
+        return _Signals(*(of if of is None else of[:runs] for of in self))
+
+
+def _takes_numpy(effect: KinematicEffect | SignalEffect) -> bool:
+    """Return whether an effect says so where its function is: one put in its place may not."""
+    name = "felt_rate" if isinstance(effect, KinematicEffect) else "recorded_stress"
+    kind = next(kind for kind in type(effect).__mro__ if name in vars(kind))
+    return vars(kind).get("takes_numpy", False)
+
+
+def _before_runs(thetas: Float[np.ndarray, "lanes p"]) -> Float[np.ndarray, "p lanes 1 1"]:
+    return thetas.T[..., None, None]
+
+
 class _Runs(NamedTuple):
     """Runs as the kernel takes them, in arrays of NumPy.
 
@@ -64,7 +106,7 @@ class _Runs(NamedTuple):
     least: np.ndarray
     jump: np.ndarray
     flow: np.ndarray  # kinematics of each run
-    sample: np.ndarray  # positions of the samples among step ends
+    signals: _Signals  # what effects on rates and signals take
     rate: np.ndarray
     tool_rate: np.ndarray
     in_shear: bool
@@ -122,7 +164,7 @@ def _runs(part: TransientFlows) -> _Runs:
     commanded = np.asarray(part.commanded_rate)
     rate = np.repeat(commanded[..., None], LANES, axis=-1)
     tool_rate = np.tile(commanded[:, ::2], (LANES, 1, 1))
-    times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
+    times = np.asarray(part.times)[:, ::2]
     last = np.asarray(part.last_step)
     held, whole, least = intervals(part)
     flow = part.kinematics
@@ -139,7 +181,7 @@ def _runs(part: TransientFlows) -> _Runs:
         least,
         JUMP * times[:, -1],
         flows_of(part.kinematics),
-        sample,
+        _Signals.of(part),
         rate,
         tool_rate,
         flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
@@ -155,8 +197,8 @@ class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
     `rates`: of a vector, the effects present, and a run: the felt rate at ends and middles of
-    steps, and the tool's at ends. `recorded`: of these, the stress and both rates, what samples
-    record.
+    steps, and the tool's at ends. `distorted`: of these, the stress and both rates, what would be
+    recorded at ends.
     """
 
     def __init__(
@@ -164,14 +206,22 @@ class SideBySide(LanePredictor):
         fluid: AugmentedFluid,
         code: Kernel,
         rates: Callable,
-        recorded: Callable,
+        distorted: Callable,
         made_from: tuple,
     ):
         super().__init__(fluid, code, made_from)
+        self._in_numpy = rates, distorted
         effects, still = fluid.structure.effects, KinematicEffect.felt_rate
         shaping = [e for e in effects if isinstance(e, KinematicEffect)]
-        self._shaping = self._amplitudes(e for e in shaping if type(e).felt_rate is not still)
-        self._distorting = self._amplitudes(e for e in effects if isinstance(e, SignalEffect))
+        shaping = [e for e in shaping if type(e).felt_rate is not still]
+        distorting = [e for e in effects if isinstance(e, SignalEffect)]
+        self._shaping, self._distorting = map(self._amplitudes, (shaping, distorting))
+        others = [e for e in (*shaping, *distorting) if not _takes_numpy(e)]
+        self._only_jax = self._amplitudes(others)
+
+        def recorded(theta, present, run, *signals):
+            return distorted(theta, present, run, *signals)[run.sample_index]
+
         axes = (None, None, 0), (0, None, None)
         self._rates = self._program("rates", rates, *axes, vectors_to=(-1, 0))
         axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
@@ -206,11 +256,9 @@ class SideBySide(LanePredictor):
         if len(modes) > declared:
             modes = modes[modes_in_use(modes[:, 0].T, declared)]
         rate, tool_rate = laid_out.rate, laid_out.tool_rate
-        present = self._fluid.present(thetas)
         is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
         if part.steps is not None or is_shaped:
-            shaped = self._rates(thetas, present, self._placed(part))
-            rate, tool_rate = (np.asarray(array) for array in shaped)
+            rate, tool_rate = self._shaped(thetas, part, laid_out.signals)
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
@@ -219,7 +267,7 @@ class SideBySide(LanePredictor):
             **{name: getattr(laid_out, name) for name in _OF_RUNS},
         }  # fmt: skip
         stress, felt, of_modes = self._code(runs, declared, used, given, asked.whole)
-        places = np.arange(runs)[:, None], laid_out.sample[:runs]
+        places = np.arange(runs)[:, None], laid_out.signals.sample[:runs]
         at_samples, beside = stress[places], []
         if asked.whole:
             own = (at_samples[:, :, None], of_modes[places])
@@ -233,9 +281,40 @@ class SideBySide(LanePredictor):
             stress[:runs] += _between(at_samples - stress[places], part)
         beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
         felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
-        seen = self._placed(part), stress, felt, tool_rate
-        found = np.asarray(self._recorded(thetas, present, *seen))
-        return np.concatenate([found[:, :runs, :, None], *beside], axis=-1)
+        signals = laid_out.signals.of_first(runs)
+        found = self._at_samples(thetas, part, signals, stress, felt, tool_rate)
+        return np.concatenate([found[..., None], *beside], axis=-1)
+
+    def _is_plain(self, thetas: np.ndarray, part: TransientFlows) -> bool:
+        plain = part.steps is None and part.kinematics is None
+        return plain and not np.any(thetas[:, self._only_jax])
+
+    def _shaped(
+        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the felt rate, lanes last, and the tool's, lanes first."""
+        present = self._fluid.present(thetas)
+        if not self._is_plain(thetas, part):
+            felt, of_tool = self._rates(thetas, present, self._placed(part))
+            return np.asarray(felt), np.asarray(of_tool)
+        found = self._in_numpy[0](_before_runs(thetas), present, signals)
+        felt, of_tool = (np.broadcast_to(of, (LANES, *of.shape[-2:])) for of in found)
+        return np.ascontiguousarray(np.moveaxis(felt, 0, -1)), of_tool
+
+    def _at_samples(
+        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals, stress, felt, of_tool
+    ) -> Float[np.ndarray, "lanes runs n"]:
+        """Return what samples record, of stress and felt rate at ends, lanes last."""
+        present, runs = self._fluid.present(thetas), len(signals.times)
+        if not self._is_plain(thetas, part):
+            found = self._recorded(thetas, present, self._placed(part), stress, felt, of_tool)
+            return np.asarray(found)[:, :runs]
+        given = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
+        with np.errstate(all="ignore"):  # of a vector that runs away
+            found = self._in_numpy[1](
+                _before_runs(thetas), present, signals, *given, of_tool[:, :runs]
+            )
+        return found[:, np.arange(runs)[:, None], signals.sample]
 
     def _table(
         self, numbers: Numbers, part: TransientFlows, time: float, count: int

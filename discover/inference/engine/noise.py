@@ -35,6 +35,9 @@ told to. Records without noise differ from any integration by as much."""
 _FAR = 1e6
 """Of a record, from which on a residual is none."""
 
+_BLOCK = 16
+"""Variances whose logarithms are taken together: each is less than `_FAR` to the third."""
+
 _SHARES = np.array(SHARES)
 
 _GRID = tuple(product(range(len(SHARES)), range(len(CORRELATIONS))))
@@ -73,6 +76,7 @@ class NoiseModel:
         self._size = rows.size[self.kept]
         self._log_size = float(np.sum(np.log(self._size)))
         self._before = np.maximum(np.arange(len(self.kept)) - 1, 0)
+        self._blocks = np.arange(0, len(self.kept), _BLOCK)
         self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
         self._there = np.flatnonzero(self._count)
         half = 0.5 * self._alike
@@ -130,19 +134,24 @@ class NoiseModel:
         off = off[usable][:, None, self.kept]
         relative = (predicted[usable][:, None, self.kept] / self._size) ** 2
         variance = 1.0 + _SHARES[:, None] * (relative - 1.0)
-        scaled = off / np.sqrt(variance)
+        over = 1.0 / variance
         # independent noise is a large one where it is taken for correlated or in proportion
-        own = scaled**2 + LEAST**2 / variance
-        sums = np.stack([own, own[..., self._before], scaled * scaled[..., self._before]])
+        own = (off**2 + LEAST**2) * over
+        # of the first there is none before, which its decay of zero says
+        lagged = np.zeros_like(own)
+        lagged[..., 1:] = off[..., 1:] * off[..., :-1] * np.sqrt(over[..., 1:] * over[..., :-1])
+        parts = [own, own[..., self._before], lagged]
         if self._order is not None:
-            sums = sums[..., self._order]
-        sums = np.add.reduceat(sums, self._groups, axis=-1)[..., None, :]
+            parts = [part[..., self._order] for part in parts]
+        sums = [np.add.reduceat(part, self._groups, axis=-1)[..., None, :] for part in parts]
         decay = self._decays
         left = (sums[0] + decay**2 * sums[1] - 2.0 * decay * sums[2]) / (1.0 - decay**2)
         square = np.zeros((len(usable), len(SHARES), len(CORRELATIONS), runs))
         square[..., self._there] = np.add.reduceat(left, self._group_starts, axis=-1)
         square = square.reshape(len(usable), len(_GRID), runs)
-        spreads = self._log_size + 0.5 * np.sum(np.log(variance), axis=-1)
+        # a logarithm of many together: none leaves the range of numbers
+        together = np.multiply.reduceat(variance, self._blocks, axis=-1)
+        spreads = self._log_size + 0.5 * np.sum(np.log(together), axis=-1)
         densities, common = self._marginal(square)
         densities += (self._determinants - spreads[..., None]).reshape(len(usable), -1) + _PRIORS
         values[usable] = np.logaddexp.reduce(densities, axis=1)
@@ -221,5 +230,7 @@ class NoiseModel:
         """Return columns of the rows that are kept, over independent noise of variance one."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
         scaled = values[self.kept] / deviation[:, None]
-        decay = self._decay(noise.correlation)[:, None]
-        return (scaled - decay * scaled[self._before]) / np.sqrt(1.0 - decay**2)
+        decay = self._decay(noise.correlation)[:, None]  # zero at the first of a run
+        scaled[1:] -= decay[1:] * scaled[:-1]
+        scaled /= np.sqrt(1.0 - decay**2)
+        return scaled

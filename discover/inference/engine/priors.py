@@ -79,8 +79,8 @@ class Priors(dict[int, Prior]):
         return np.array([(prior.low, prior.high) for prior in self.values()]).reshape(-1, 2)
 
     @cached_property
-    def _are_logarithms(self) -> np.ndarray:
-        return np.array([prior.is_logarithm for prior in self.values()], bool)
+    def _logarithms(self) -> np.ndarray:
+        return np.flatnonzero([prior.is_logarithm for prior in self.values()])
 
     @cached_property
     def _are_amplitudes(self) -> np.ndarray:
@@ -95,16 +95,18 @@ class Priors(dict[int, Prior]):
 
     def coordinates(self, theta: Float[np.ndarray, "*trials p"]) -> Float[np.ndarray, "*trials n"]:
         """Return the coordinates that are fitted, of the constants."""
-        values, logs = theta[..., self.positions], self._are_logarithms
-        values[..., logs] = np.log(values[..., logs])
+        values, logs = theta[..., self.positions], self._logarithms
+        if len(logs):
+            values[..., logs] = np.log(values[..., logs])
         return values
 
     def placed(
         self, theta: Float[np.ndarray, " p"], coordinates: Float[np.ndarray, "*trials n"]
     ) -> Float[np.ndarray, "*trials p"]:
         """Return the constants at other coordinates of what is free."""
-        values, logs = coordinates.copy(), self._are_logarithms
-        values[..., logs] = np.exp(values[..., logs])
+        values, logs = coordinates.copy(), self._logarithms
+        if len(logs):
+            values[..., logs] = np.exp(values[..., logs])
         found = np.broadcast_to(theta, (*values.shape[:-1], len(theta))).copy()
         found[..., self.positions] = values
         return found

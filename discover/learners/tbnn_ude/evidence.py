@@ -37,7 +37,8 @@ def surprises(
     if not 0.0 < squares[best] < np.inf:
         return np.where(squares == squares[best], 0.0, np.inf)
     precision = _independent(misses[best], problem.records.seen) / squares[best]
-    enduring = np.isfinite(squares) & [endures(law, problem) for law in laws]
+    twice = at_twice_the_rate(problem)
+    enduring = np.isfinite(squares) & [endures(law, twice) for law in laws]
     found = np.full(len(laws), np.inf)
     usable = enduring if np.any(enduring) else np.isfinite(squares)
     for i in np.flatnonzero(usable).tolist():
@@ -46,11 +47,15 @@ def surprises(
     return found
 
 
-def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
-    """Return whether a law's stress stays finite in the training flows at twice the rate."""
+def at_twice_the_rate(problem: TrainingProblem) -> TrainingProblem:
+    """Return the problem with its flows at twice the rate."""
     twice = problem.flows.faster(jnp.full(len(problem.flows), 2.0))
-    faster = eqx.tree_at(lambda tree: tree.flows, problem, twice)
-    return bool(np.all(np.isfinite(np.asarray(variational.trajectories(law, faster).states))))
+    return eqx.tree_at(lambda tree: tree.flows, problem, twice)
+
+
+def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
+    """Return whether a law's stress stays finite in the flows of a problem."""
+    return bool(np.all(np.isfinite(np.asarray(variational.trajectories(law, problem).states))))
 
 
 def posterior_draws(

@@ -17,6 +17,7 @@ from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import (
     Along,
     Rebuild,
+    rebuilt,
     side_by_side,
     states_and_jacobian,
     trajectories,
@@ -96,6 +97,7 @@ def parts(law: TensorBasisNetwork, cloud: Cloud) -> tuple[Float[Array, "m 8"], F
     return coefficients * cloud.size, (coefficients - mean) * cloud.size
 
 
+@compiled
 def prior_residual(
     law: TensorBasisNetwork, cloud: Cloud, weights: PriorWeights
 ) -> Float[Array, " r"]:
@@ -163,31 +165,46 @@ class Steps:
         self._damping = 1.0
         self._known: tuple[np.ndarray, ...] | None = None
 
+    def goes_up(self, rows: Float[Array | np.ndarray, " rows"]) -> bool:
+        """Return whether a trial with these residuals is rejected; the next one is then nearer."""
+        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
+            found, promised = self._gains(_OF_WEIGHTS * np.asarray(rows))
+        if self._known is None or found <= _LEAST_KEPT * promised:
+            return False
+        self._damping *= _MORE_DAMPING
+        self._find_trial()
+        return True
+
     def take(self, linearised: Linearised) -> None:
         """Take the step to the trial if it goes down, and find the next trial."""
+        if self.goes_up(linearised.rows):
+            return
         rows, matrix = (_OF_WEIGHTS * np.asarray(part) for part in linearised)
-        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
-            if self._known is None or self._is_down(rows):
-                self.best, self.norm = self.trial, float(np.linalg.norm(rows)) / _OF_WEIGHTS
-                self._known = rows, matrix, matrix.T @ matrix, matrix.T @ rows
+        found, promised = self._gains(rows)
+        if found < _MOST_KEPT * promised:
+            self._damping *= _LESS_DAMPING
+        with np.errstate(over="ignore", invalid="ignore"):
+            self.best, self.norm = self.trial, float(np.linalg.norm(rows)) / _OF_WEIGHTS
+            self._known = rows, matrix, matrix.T @ matrix, matrix.T @ rows
+        self._find_trial()
+
+    def _gains(self, rows: np.ndarray) -> tuple[float, float]:
+        """Return the change of the squares at the trial, and what the derivatives promised."""
+        if self._known is None:
+            return 0.0, 0.0
+        before, matrix, *_ = self._known
+        promised = np.sum((before + matrix @ (self.trial - self.best)) ** 2) - np.sum(before**2)
+        found = float(np.sum(rows**2) - np.sum(before**2))
+        return found if np.isfinite(found) else np.inf, float(promised)
+
+    def _find_trial(self) -> None:
+        assert self._known is not None
         _, _, curvature, slope = self._known
         damped = curvature + self._damping * np.eye(len(slope))
         self.trial = np.full_like(self.best, np.nan)
         if np.all(np.isfinite(damped)) and np.all(np.isfinite(slope)):
             with suppress(np.linalg.LinAlgError):  # more damping is asked for
                 self.trial = self.best - cho_solve(cho_factor(damped), slope)
-
-    def _is_down(self, rows: np.ndarray) -> bool:
-        assert self._known is not None
-        before, matrix, *_ = self._known
-        promised = np.sum((before + matrix @ (self.trial - self.best)) ** 2) - np.sum(before**2)
-        found = np.sum(rows**2) - np.sum(before**2)
-        if not found <= _LEAST_KEPT * promised:
-            self._damping *= _MORE_DAMPING
-            return False
-        if found < _MOST_KEPT * promised:
-            self._damping *= _LESS_DAMPING
-        return True
 
 
 _PATIENCE = 4
@@ -231,6 +248,14 @@ def _with_prior(weights, objective, along, jacobian):
     rows = jnp.concatenate([misses.ravel(), prior(weights)])
     matrix = jnp.concatenate([data.reshape(misses.size, -1), jax.jacfwd(prior)(weights)])
     return Linearised(rows, matrix)
+
+
+def residual(weights: Float[Array, " p"], objective: Objective) -> Float[np.ndarray, " rows"]:
+    """Return the residuals of `linearise` alone, which cost a twelfth where a network varies."""
+    law = rebuilt(objective.rebuild, weights)
+    misses = np.asarray(law_misfit(law, objective.problem))
+    prior = prior_residual(law, objective.cloud, objective.prior)
+    return np.append(misses, np.asarray(prior))
 
 
 class Stopping:
@@ -289,8 +314,12 @@ def minimise(
     `pace`: as of `Stopping`.
     """
     descent, stopping = Steps(weights), Stopping(target, pace)
+    # of constants the derivatives cost nothing beside the states
+    costly = objective.rebuild.template.network is not None
     for _ in range(steps):
-        descent.take(linearise(on_device(descent.trial), objective, side_by_side))
+        trial = on_device(descent.trial)
+        if not (costly and descent.norm > 0.0 and descent.goes_up(residual(trial, objective))):
+            descent.take(linearise(trial, objective, side_by_side))
         if callback is not None:
             callback(descent.norm)
         if stopping.done(descent.norm) or not np.isfinite(descent.norm):
