@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.linalg.lapack import dtbtrs
+from scipy.linalg import get_lapack_funcs
 from scipy.special import roots_sh_jacobi
 
 from discover.effects.base import (
@@ -57,9 +57,10 @@ def _carried_in_numpy(
     lagged[..., 1:] = forcing
     # the matrix of the recursion has ones on its diagonal, and one line below it
     bands = np.ones((2, lagged.shape[-1]))
+    (solve,) = get_lapack_funcs(("tbtrs",), (bands,))
     for row, own in zip(lagged.reshape(-1, lagged.shape[-1]), below, strict=True):
         bands[1, :-1] = own
-        row[:] = dtbtrs(bands, row[:, None], uplo="L", diag="U")[0][:, 0]
+        row[:] = solve(bands, row[:, None], uplo="L", diag="U")[0][:, 0]
     return lagged
 
 

@@ -90,7 +90,8 @@ def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
         for k, step in enumerate(run.rate_steps):
             rows[i, k] = step.start, step.end, step.change, step.share
             place[i, k] = -1 if step.place is None else step.place
-    return RateSteps(*np.moveaxis(rows, -1, 0), place)
+    start, end, change, share = np.moveaxis(rows, -1, 0)
+    return RateSteps(start, end, change, share, place)
 
 
 # An instrument effect acts within the first samples, so the first gap is divided this often

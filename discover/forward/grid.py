@@ -373,10 +373,10 @@ def make_grids(
         padding = grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)
         stacked[0].append(np.concatenate([grid, padding]))
         stacked[1].append(np.pad(index, (0, n_samples - len(index)), mode="edge"))
-    columns = [on_device(np.stack(s)) for s in stacked]
+    all_times, indices = (on_device(np.stack(s)) for s in stacked)
     if protocols[0].control != "oscillation":
         cycle = on_device(np.array(cycles)) if cycle_steps else None
-        return IntegrationGrid(*columns, cycle=cycle, cycle_steps=cycle_steps)
+        return IntegrationGrid(all_times, indices, cycle=cycle, cycle_steps=cycle_steps)
     largest = max(float(np.max(np.asarray(p.table_strains))) for p in protocols)
     # a cycle of so large steps errs by 5e-6 of the moduli at a strain of 10 (tested), and one of
     # twice these, on a rough grid, by sixteen times as much
@@ -385,7 +385,7 @@ def make_grids(
     step /= limits.get("pieces", 1)
     phase = half_cycle(largest, step)
     phases = on_device(np.tile(phase, (len(grids), 1)))
-    return IntegrationGrid(*columns, phases)
+    return IntegrationGrid(all_times, indices, phases)
 
 
 def half_cycle(strain: float, strain_step: float) -> Float[np.ndarray, " m"]:

@@ -78,7 +78,10 @@ def expansion_of(
 ) -> LibraryExpansion:
     """Return the law of some terms of a library, added to the extra term of `base`."""
     coefficients, inner = map(on_device, terms.over(library))
-    return LibraryExpansion(coefficients, inner, library, linear_relaxation, base)
+    return LibraryExpansion(
+        coefficients=coefficients, inner=inner, library=library,
+        linear_relaxation=linear_relaxation, base=base,
+    )  # fmt: skip
 
 
 # terms searched for by default, so that what is found shares programs with what is known

@@ -71,7 +71,8 @@ class _Signals(NamedTuple):
 
     def of_first(self, runs: int) -> "_Signals":
         """Return the first runs, which are no padding."""
-        return _Signals(*(of if of is None else of[:runs] for of in self))
+        times, rate, clock, strain, sample, *_ = self
+        return _Signals(times[:runs], rate[:runs], clock[:runs], strain[:runs], sample[:runs])
 
 
 def _takes_numpy(effect: KinematicEffect | SignalEffect) -> bool:
