@@ -100,7 +100,7 @@ class ExpectedError:
     `inside`, `beyond`: inside the rates of the data and beyond them; None where unknown.
     `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
     `missing`: what stands in place of a number that is unknown.
-    `note`: why it is unknown, or on what it rests: ``not measured; constants alone``.
+    `note`: why it is unknown, or on what it rests: ``not measured; if the law is right``.
     """
 
     inside: float | None = None

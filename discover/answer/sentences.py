@@ -107,7 +107,7 @@ def reduced_to(answer: Any) -> str:
 def shortened(factor: float) -> str:
     """Return what a shift factor does to times, in words."""
     by, way = (1.0 / factor, "shorter") if factor < 1.0 else (factor, "longer")
-    return f"{significant(by, 3)} times {way}"
+    return f"{way} by a factor of {significant(by, 3)}"
 
 
 _MOST_SHIFTS = 3

@@ -281,7 +281,7 @@ def _expected(answer: Answer) -> list[dict[str, Any]]:
 
 def _worst(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of the run that is missed most, if it is, and of the best classical law."""
-    told = [] if (worst := worst_run(answer)) is None else [("worst run", *worst)]
+    told = [] if (worst := worst_run(answer)) is None else [("worst run in range", *worst)]
     if answer.best_classical is not None:
         near, error = answer.best_classical
         told.append((CLASSICAL.lower(), near, percent_of(error)))

@@ -118,7 +118,7 @@ def test_fitted_runs_alone_are_a_residual():
 def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
     close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09)}
     told = errors_by_quantity(result(FITTED, spread_of_laws=close))
-    assert told["N1"].note == "not measured; constants alone"
+    assert told["N1"].note == "not measured; if the law is right"
     assert told["N2"].note == "−9 % of N1 by this law"
     assert told["N2"].missing == "not measured"
     assert not told["N2"].is_known

@@ -225,24 +225,26 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     factors = {-10.0: 1.0 / 131.234, -23.0: 1.0 / 14.771}
     shifted = replace(MELT, temperature_C=-35.0, shift_factors=factors)
     assert (
-        "Moduli and times are those at −35 °C; times are 131 times shorter at −10 °C "
-        "(a_T = 0.00762), 14.8 times shorter at −23 °C (a_T = 0.0677)."
+        "Moduli and times are those at −35 °C; times are shorter by a factor of 131 at −10 °C "
+        "(a_T = 0.00762), shorter by a factor of 14.8 at −23 °C (a_T = 0.0677)."
     ) in shifted.lines
     assert "0.003–3 1/s reduced to −35 °C." in shifted.headline
     screen = answer_screen(shifted)
     told = [(row[0], row[1], row[2]) for row in screen["constants"][-2:]]
-    said = "at −10 °C: times 131 times shorter than at −35 °C"
+    said = "at −10 °C: times shorter by a factor of 131 than at −35 °C"
     assert told[0] == ("a_T", said, "0.00762")
     assert told[1][2] == "0.0677"
     cold = replace(shifted, shift_factors={-50.0: 20.0})
-    assert answer_screen(cold)["constants"][-1][1].startswith("at −50 °C: times 20 times longer")
+    assert answer_screen(cold)["constants"][-1][1].startswith(
+        "at −50 °C: times longer by a factor of 20"
+    )
     clock = "times on the instrument's clock"  # which is not shifted
     assert clock not in screen["suspected"]  # a gain has no time
     lag = Suspect("transducer_lag", (Constant("tau", 0.35, (0.13, 0.48), "s"),))
     assert clock in answer_screen(replace(shifted, suspects=(lag,)))["suspected"]
     assert shifted.use["shift_factors"]["-10"] == pytest.approx(1.0 / 131.234)
     page = render("answer.html", screen=answer_screen(replace(MELT, temperature_C=-35.0)))
-    assert "times shorter" not in page
+    assert "by a factor" not in page
 
 
 @pytest.mark.parametrize(("count", "shown"), [(1, True), (3, True), (4, False), (10, False)])
