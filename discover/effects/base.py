@@ -303,10 +303,13 @@ class SignalEffect(AbstractEffect):
     """Changes what was recorded of the stress.
 
     `of_force`: whether of a normal or tensile stress, which a force tells, and else of a torque.
+    `is_zero`: whether it is what is read without a stress, which stood so before the record began:
+    it is added last, for a lag or a delay would make it begin with the record.
     """
 
     kind: ClassVar[Kind] = "signal"
     of_force: ClassVar[bool] = False
+    is_zero: ClassVar[bool] = False
 
     @abstractmethod
     def recorded_stress(self, values: Values, record: Record) -> Signal:

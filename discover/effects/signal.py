@@ -204,7 +204,7 @@ NORMAL_FORCE_GAIN = NormalForceGain(
 class StressOffset(SignalEffect):
     """A constant is added to the stress recorded."""
 
-    acts_on_steady_states = takes_numpy = True
+    acts_on_steady_states = takes_numpy = is_zero = True
 
     def recorded_stress(self, values, record):
         """Return σ + σ₀."""

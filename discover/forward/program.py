@@ -58,7 +58,8 @@ class Program:
         ]
         self._upstream = [e for e in kinematic if e.shapes_command]
         self._downstream = [e for e in kinematic if not e.shapes_command]
-        self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
+        signal = (e for e in structure.effects if isinstance(e, SignalEffect))
+        self._signal = sorted(signal, key=lambda effect: effect.is_zero)
         self.averages = [e for e in structure.effects if isinstance(e, RadialAverage)]
         self._of_torque = [effect for effect in self._signal if not effect.of_force]
         # a name does not tell one law from another that was registered under it in its place

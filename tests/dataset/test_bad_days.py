@@ -50,7 +50,6 @@ library = { degree = 1, closed_forms = ["exp"] }
 test = "paper"
 seed = 0
 high_deborah = [1.5]
-sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1] }
 """,
 }
 

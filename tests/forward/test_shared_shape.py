@@ -1,5 +1,7 @@
 """Runs laid out in a shared shape: one program, and what each predicts stays the same."""
 
+from dataclasses import fields
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -51,16 +53,26 @@ def test_runs_in_a_shared_shape_are_predicted_as_in_their_own(runs, monkeypatch)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(expected))
 
 
+class OwnLag(type(make_effect("transducer_lag"))):
+    """What somebody wrote in JAX, and never said that NumPy does."""
+
+    def recorded_stress(self, values, record):
+        return jnp.asarray(record.stress) * jnp.exp(-values[0])
+
+
 def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own(monkeypatch):
     model, theta = model_of()
     model.predict(theta, make_batch(MANY))
     made, programs = Compiled._made, []
     monkeypatch.setattr(Compiled, "_made", lambda self, *of: programs.append(1) or made(self, *of))
-    for runs in (FEW, MANY[:2], [*MANY, *MANY]):
+    for runs in (FEW, MANY[:2], [*MANY, *MANY], [*MANY, *MANY, *MANY]):
         model.predict(theta, make_batch(runs))
     assert not programs
-    # negative control: more runs than stand in one shape
-    model.predict(theta, make_batch([*MANY, *MANY, *MANY]))
+    # negative control: an effect that is not in NumPy
+    lag = make_effect("transducer_lag")
+    values = {field.name: getattr(lag, field.name) for field in fields(lag)}
+    own = AugmentedModel(IN_SOLVENT, [OwnLag(**{**values, "name": "own_lag"})])
+    own.predict(np.where(own.first_trial > 0, 0.01, 0.0), make_batch(MANY))
     assert programs
 
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from discover.dataset import Run
-from discover.effects import make_effect, named_effects
+from discover.effects import RadialAverage, make_effect, named_effects
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.protocols import oscillatory_shear, shear_rates, start_up
 
@@ -61,8 +61,13 @@ def test_all_effects_together_at_zero_amplitude_leave_maxwell():
     np.testing.assert_allclose(oscillation, exact, atol=1e-4 * MODULUS)
 
 
-# an error of the normal force leaves a shear stress as it is (tests/inference/test_transducers.py)
-OF_SHEAR = sorted(n for n, one in named_effects().items() if not getattr(one, "of_force", False))
+# an error of the normal force leaves a shear stress as it is (tests/inference/test_transducers.py),
+# and plates leave that of a Maxwell fluid (tests/effects/test_parallel_plates.py)
+OF_SHEAR = sorted(
+    name
+    for name, one in named_effects().items()
+    if not (getattr(one, "of_force", False) or isinstance(one, RadialAverage))
+)
 
 
 @pytest.mark.parametrize("name", OF_SHEAR)
@@ -79,6 +84,18 @@ def test_every_effect_changes_the_record_and_composes_with_another(name):
     both = predict(**{name: size, other: 0.1})
     assert np.max(np.abs(both - alone)) > 1e-3
     assert np.max(np.abs(both - predict(**{other: 0.1}))) > 1e-3
+
+
+@pytest.mark.parametrize("slow", ["time_delay", "transducer_lag"])
+def test_a_zero_of_the_transducer_stood_there_before_the_record(slow):
+    times = np.linspace(0.0, 2.0, 21)
+    run = Run("from_zero", times, start_up(STEADY), np.full(21, STEADY), np.ones(21))
+    batch, thetas = make_batch([run]), np.tile(MODEL.zero(), (2, 1))
+    thetas[:, MODEL.positions(slow)[0]] = 0.05
+    thetas[1, MODEL.positions("stress_offset")[0]] = 7.0
+    without, with_zero = MODEL.predictions(thetas, batch)
+    # rounding alone; a zero that began with the record would be missing from the first sample
+    np.testing.assert_allclose(with_zero - without, 7.0, atol=1e-9)
 
 
 def test_an_extra_mode_adds_its_own_start_up():
