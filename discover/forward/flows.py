@@ -338,24 +338,29 @@ Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 """Flows of one control, which share one program; of all but oscillations one row for each run."""
 
 
-def at_radius(part: Flows, radius: float) -> Flows | None:
-    """Return flows between plates at a share of the radius of the rim, whose rate is commanded.
+def at_radii(part: Flows, radii: Float[np.ndarray, " r"]) -> Flows | None:
+    """Return flows between plates at shares of the radius of the rim, whose rate is commanded.
 
-    None where that is no shear at a given rate.
+    Those of the first radius come first. None where that is no shear at a given rate.
     """
+    if isinstance(part, StressFlows) or getattr(part, "kinematics", None) is not None:
+        return None
+
+    def repeated(leaf: ArrayLike) -> Array:
+        return on_device(np.concatenate([np.asarray(leaf)] * len(radii)))
 
     def scaled(values: ArrayLike) -> Array:
-        return on_device(radius * np.asarray(values))
+        values = np.asarray(values)
+        return on_device(np.concatenate([radius * values for radius in radii]))
 
+    many = jax.tree.map(repeated, part)
     if isinstance(part, PeriodicFlows):
-        return replace(part, strain=scaled(part.strain))
-    if isinstance(part, StressFlows) or part.kinematics is not None:
-        return None
+        return replace(many, strain=scaled(part.strain))
     if isinstance(part, SteadyFlows):
-        return replace(part, rate=scaled(part.rate))
-    steps = part.steps and replace(part.steps, change=scaled(part.steps.change))
+        return replace(many, rate=scaled(part.rate))
+    steps = part.steps and replace(many.steps, change=scaled(part.steps.change))
     strain, rate = scaled(part.strain_before), scaled(part.commanded_rate)
-    return replace(part, commanded_rate=rate, strain_before=strain, steps=steps)
+    return replace(many, commanded_rate=rate, strain_before=strain, steps=steps)
 
 
 class Batch(eqx.Module):

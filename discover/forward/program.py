@@ -22,7 +22,7 @@ from discover.forward.flows import (
     SteadyFlows,
     StressFlows,
     TransientFlows,
-    at_radius,
+    at_radii,
 )
 from discover.forward.periodic_states import PHASE, first_harmonic
 from discover.forward.side_by_side import (
@@ -372,16 +372,14 @@ class Predictor:
         found = self._at_rim(trials, batch, number, whole)
         for effect in self.program.averages:
             share = trials.thetas[:, self.program.fluid.slices[effect.name].start]
-            flows, there = self._inside(batch, batch.parts[number], effect), np.flatnonzero(share)
-            if flows is None or not len(there):
+            there = np.flatnonzero(share)
+            if not len(there) or (inside := self._inside(batch, number, effect)) is None:
                 continue
-            is_modulus = isinstance(batch.parts[number], PeriodicFlows)
-            weights = effect.of_modulus if is_modulus else effect.of_stress
+            flows, weights, at_rim = inside
             some, rim = Trials(*(of[there] for of in trials)), found[there, ..., 0]
-            mean = weights[-1] * rim
-            for flow, weight in zip(flows, weights[:-1], strict=True):
-                if weight:  # a modulus on the axis has none, and no strain to be measured by
-                    mean = mean + weight * self._at_rim(some, flow, number, False)[..., 0]
+            within = self._at_rim(some, flows, number, False)[..., 0]
+            within = within.reshape(len(there), len(weights), *rim.shape[1:])
+            mean = at_rim * rim + np.einsum("r,tr...->t...", weights, within)
             found[there, ..., 0] = rim + share[there, None, None] * (mean - rim)
         return found
 
@@ -415,13 +413,29 @@ class Predictor:
         return self.side_by_side(part).predict(asked)
 
 
-def _inside(batch: Batch, part: Flows, effect: RadialAverage) -> list[Batch] | None:
-    """Return the flows of a part at each radius below the rim; None where there are none."""
-    inside = [at_radius(part, radius) for radius in effect.radii[:-1]]
-    if any(one is None for one in inside):
+def _inside(
+    batch: Batch, number: int, effect: RadialAverage
+) -> tuple[Batch, np.ndarray, float] | None:
+    """Return the flows of a part at the radii below the rim, their weights and that of the rim.
+
+    All radii are runs of one batch. None where there are none.
+    """
+    part, moduli = batch.parts[number], batch.moduli
+    is_modulus = isinstance(part, PeriodicFlows)
+    weights = np.array(effect.of_modulus if is_modulus else effect.of_stress)
+    at = np.flatnonzero(weights[:-1])  # on the axis no modulus has a strain to be measured by
+    flows = at_radii(part, np.array(effect.radii)[at])
+    if flows is None:
         return None
-    parts = [[one if of is part else of for of in batch.parts] for one in inside]
-    return [replace(batch, parts=tuple(own)) for own in parts]
+    if isinstance(part, PeriodicFlows):
+        states = len(part.strain)
+        moduli = tuple(
+            (modulus, tuple(place + k * states for place in places))
+            for k in range(len(at))
+            for modulus, places in moduli
+        )
+    parts = tuple(flows if i == number else own for i, own in enumerate(batch.parts))
+    return replace(batch, parts=parts, moduli=moduli), weights[at], float(weights[-1])
 
 
 def _of_sweeps(
