@@ -1,5 +1,6 @@
 """Primitives of JAX that compute with numbers, or move them about, on values of lanes."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial, reduce
 from typing import Any
@@ -165,6 +166,24 @@ def _tanh(arithmetic: Arithmetic, x: Value) -> Value:
     return arithmetic.divide(more, arithmetic.add(more, 2.0))
 
 
+_ALL_SQUARE = 1e8
+"""Size from which on one is below the last digit of the square."""
+
+
+def _asinh(arithmetic: Arithmetic, x: Value) -> Value:
+    """Return ± ln(1 + |x| + x²/(1 + √(1 + x²))); ln 2|x| where the square is all there is."""
+    size = arithmetic.size(x)
+    inside = arithmetic.smaller(size, _ALL_SQUARE)
+    square = arithmetic.multiply(inside, inside)
+    root = arithmetic.root(arithmetic.add(1.0, square))
+    more = arithmetic.add(inside, arithmetic.divide(square, arithmetic.add(1.0, root)))
+    far = arithmetic.add(arithmetic.logarithm(size), math.log(2.0))
+    found = arithmetic.chosen(
+        arithmetic.compare(">", size, _ALL_SQUARE), far, _log_of_one_more(arithmetic, more)
+    )
+    return arithmetic.chosen(arithmetic.compare("<", x, 0.0), arithmetic.negative(found), found)
+
+
 def _sign(arithmetic: Arithmetic, x: Value) -> Value:
     below = arithmetic.chosen(arithmetic.compare("<", x, 0.0), -1.0, 0.0)
     return arithmetic.chosen(arithmetic.compare(">", x, 0.0), 1.0, below)
@@ -197,6 +216,7 @@ ELEMENTWISE: dict[str, Callable[[Arithmetic, dict], Callable[..., Value]]] = {
     "square": lambda a, _: lambda x: a.multiply(x, x),
     "expm1": lambda a, _: lambda x: a.exponential(x, less_one=True),
     "log1p": lambda a, _: lambda x: _log_of_one_more(a, x),
+    "asinh": lambda a, _: lambda x: _asinh(a, x),
     "tanh": lambda a, _: lambda x: _tanh(a, x),
     "logistic": lambda a, _: lambda x: _logistic(a, x),
     "sign": lambda a, _: lambda x: _sign(a, x),
