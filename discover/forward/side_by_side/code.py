@@ -1,18 +1,19 @@
 """Machine code for the effects of a fluid and a law, made once for all whose constants differ."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
 from discover.programs import compiled
-from discover.programs.lanes import Arithmetic, Translation, Writing, callable_of, kept
+from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
@@ -57,6 +58,35 @@ class Layout:
         return jax.tree.unflatten(self._structure, leaves)
 
 
+def lanes_last(values: np.ndarray) -> np.ndarray:
+    """Return values of lanes, in whole eights, with these eights first and their lanes last."""
+    return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
+
+
+class Packed(NamedTuple):
+    """Numbers that the code takes of vectors: of each of their modes, and of all."""
+
+    modes: Float[np.ndarray, "trials k m"]
+    shared: Float[np.ndarray, "trials s"]
+
+    def of_lanes(self, trial: Int[np.ndarray, " lanes"], declared: int) -> dict[str, np.ndarray]:
+        """Return what the code takes of vectors in whole eights: the eights first, lanes last.
+
+        Modes of effects are left out where no lane has them.
+        """
+        of_mode = self.modes[trial]
+        present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
+        present[:declared] = True
+        return {"shared": lanes_last(self.shared[trial]), "mode": lanes_last(of_mode[:, present])}
+
+    def of_eight(self, lanes: Int[np.ndarray, " 8"], declared: int) -> dict[str, np.ndarray]:
+        """Return what the code takes of eight vectors."""
+        return {name: values[0] for name, values in self.of_lanes(lanes, declared).items()}
+
+
+_PACKED_AT_ONCE = 32
+"""Vectors of one call to JAX, which takes as long for eight."""
+
 # From so many products of matrices on code is large; those of a law are some dozens
 _MANY_PRODUCTS = 1000
 
@@ -93,11 +123,11 @@ class Code:
         relaxations = found[0].relaxations
         self._kinds = 1 if relaxations is None else 2 * relaxations.shape[1]
 
-    def packing(self, fluid: AugmentedFluid, made_from: tuple, axis: int) -> Callable:
-        """Return a program from numbers, vectors and their moduli to modes and what these share.
+    def packing(self, fluid: AugmentedFluid, made_from: tuple) -> Callable[..., Packed]:
+        """Return what packs numbers, vectors and their moduli, however many.
 
         The solvent's viscosity stands behind the moduli. `made_from`: what tells the fluid from
-        that of another structure. `axis`: of the vectors in what is returned.
+        that of another structure.
         """
 
         def packed(numbers: Numbers, thetas, moduli):
@@ -106,9 +136,20 @@ class Code:
                 of_mode, shared = laid_out(fluid, moved, theta)
                 return self._of_mode.packed(of_mode), self._shared.packed(shared)
 
-            return jax.vmap(one, out_axes=axis)(thetas, moduli[:, :-1], moduli[:, -1])
+            return jax.vmap(one)(thetas, moduli[:, :-1], moduli[:, -1])
 
-        return compiled(packed, made_from=("packed", axis, *made_from))
+        program = compiled(packed, made_from=("packed", *made_from))
+
+        def all_packed(numbers: Numbers, thetas: np.ndarray, moduli: np.ndarray) -> Packed:
+            count = len(thetas)
+            each = []
+            for first in range(0, count, _PACKED_AT_ONCE):
+                some = np.arange(first, first + _PACKED_AT_ONCE).clip(max=count - 1)
+                each.append(program(numbers, thetas[some], moduli[some]))
+            both = (np.concatenate(arrays)[:count] for arrays in zip(*each, strict=True))
+            return Packed(*both)
+
+        return all_packed
 
     def _make(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], *others: Any) -> None:
         """Write the code, or take that of an earlier start; others tell it from other code too."""

@@ -12,15 +12,13 @@ from discover.effects import KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
 from discover.forward.periodic_states import MOST_CYCLES, NEWTON_STEP, mirror
-from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.code import Code, lanes_last
 from discover.forward.side_by_side.cycles import approximation
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.predictors import (
     Asked,
     StatePredictor,
     flows_of,
-    lanes_last,
-    modes_in_use,
 )
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.steady_states import goes_on, next_approximation, relative_change
@@ -224,7 +222,6 @@ class PeriodicSideBySide(StatePredictor):
         shaping = [e for e in acting if isinstance(e, KinematicEffect)]
         super().__init__(fluid, code, made_from, shaping, rates, (0, None, None))
         self._cycles = cycles
-        self._packed_last = code.packing(fluid, made_from, -1)
         self._states = self._amplitudes(e for e in fluid.states if e.acts_on_steady_states)
         self._series = self._amplitudes(fluid.series)
         still = [*self._amplitudes(e for e in fluid.states), *self._series]
@@ -315,17 +312,13 @@ class PeriodicSideBySide(StatePredictor):
         # of what is periodic the sum over a period is exact to all orders
         ends = np.arange(1, most + 1) <= steps[:, None]
         harmonic = np.where(ends, 2j * np.exp(-1j * phase[:, 2::2]), 0.0) / steps[:, None]
-        declared = len(asked.numbers.modulus)
+        packed = self._packed(asked.numbers, thetas, asked.moduli)
 
         def eight(lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
-            packed = self._packed_last(asked.numbers, thetas[lanes], asked.moduli[lanes])
-            modes, shared = (np.asarray(array) for array in packed)
             amplitude = strain[lanes].T
-            given = {
-                "rate": wave[:, :, None] * amplitude[:, None], "shared": shared,
-                "mode": modes[modes_in_use(modes[:, 0].T, declared)],
-                "table": np.zeros(WEIGHTS), "last": steps,
-                "held": np.ones(width.shape, np.int64),
+            given = packed.of_eight(lanes, len(asked.numbers.modulus)) | {
+                "rate": wave[:, :, None] * amplitude[:, None], "table": np.zeros(WEIGHTS),
+                "last": steps, "held": np.ones(width.shape, np.int64),
                 "cycle": np.stack([np.zeros_like(steps), steps], axis=1),
                 "width": width, "whole": width, "least": width, "period": 2.0 * np.pi / frequency,
                 "jump": np.zeros(len(steps)), "flow": flows_of(None),
@@ -345,7 +338,7 @@ class PeriodicSideBySide(StatePredictor):
         def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             own = steps[state[::LANES]]
             half = np.arange(2 * own.max() + 1) * (0.5 * np.pi / own[:, None])
-            given = eights.of_lanes(trial, declared) | {
+            given = eights.packed.of_lanes(trial, declared) | {
                 "strain": lanes_last(strain[trial, state]),
                 "frequency": lanes_last(frequency[state]),
                 "steps": own, "cosine": np.cos(half), "sine": np.sin(half),

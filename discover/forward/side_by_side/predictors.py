@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from discover.effects import AbstractEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
-from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.code import Code, Packed
 from discover.forward.side_by_side.step import Flags
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
@@ -32,6 +32,11 @@ class Asked(NamedTuple):
     runs: int
     whole: bool
 
+    @property
+    def declared(self) -> int:
+        """How many modes are declared."""
+        return len(self.numbers.modulus)
+
     def taken(self, which: np.ndarray) -> "Asked":
         """Return what is asked of some of the vectors."""
         return self._replace(thetas=self.thetas[which], moduli=self.moduli[which])
@@ -40,18 +45,6 @@ class Asked(NamedTuple):
 def in_whole_eights(count: int) -> Int[np.ndarray, " lanes"]:
     """Return places of so many lanes, the last again until the eights are full."""
     return np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
-
-
-def lanes_last(values: np.ndarray) -> np.ndarray:
-    """Return values of lanes, in whole eights, with these eights first and their lanes last."""
-    return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
-
-
-def modes_in_use(modulus: Float[np.ndarray, "lanes k"], declared: int) -> Bool[np.ndarray, " k"]:
-    """Return which modes any lane has: the declared ones, and of those of effects some."""
-    present = np.any(modulus != 0.0, axis=0)
-    present[:declared] = True
-    return present
 
 
 def flows_of(kinematics: Any) -> Float[np.ndarray, "runs numbers"]:
@@ -82,13 +75,13 @@ class MadeOnce:
 class LanePredictor:
     """Predictions of one kind of flows for one structure of law and effects, in lanes.
 
-    `made_from`: what tells the structure from another. `axis`: of the vectors in what is packed.
+    `made_from`: what tells the structure from another.
     """
 
-    def __init__(self, fluid: AugmentedFluid, code: Any, made_from: tuple, axis: int = -1):
+    def __init__(self, fluid: AugmentedFluid, code: Any, made_from: tuple):
         self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
         self._made_from = made_from
-        self._packed = code.packing(fluid, made_from, axis)
+        self._packed: Callable[..., Packed] = code.packing(fluid, made_from)
 
     def _amplitudes(self, effects: Iterable[AbstractEffect]) -> list[int]:
         return [self._fluid.slices[effect.name].start for effect in effects]
@@ -133,19 +126,12 @@ class Eights(NamedTuple):
     """Vectors in whole eights, the last again until they are full.
 
     `pairs`, `places`: of each eight its vectors and moduli, and where these stand among the
-    vectors. `modes`, `shared`: what vectors say of each mode, and of all, lanes first.
+    vectors.
     """
 
     pairs: list[tuple[np.ndarray, np.ndarray]]
     places: list[np.ndarray]
-    modes: np.ndarray
-    shared: np.ndarray
-
-    def of_lanes(self, trial: np.ndarray, declared: int) -> dict[str, np.ndarray]:
-        """Return what the code takes of vectors, one a lane, in whole eights."""
-        of_mode = self.modes[trial]
-        present = modes_in_use(of_mode[:, :, 0], declared)
-        return {"shared": lanes_last(self.shared[trial]), "mode": lanes_last(of_mode[:, present])}
+    packed: Packed
 
 
 class StatePredictor(LanePredictor):
@@ -164,7 +150,7 @@ class StatePredictor(LanePredictor):
         rates: Callable,
         *axes: Sequence[int | None],
     ):
-        super().__init__(fluid, code, made_from, axis=0)
+        super().__init__(fluid, code, made_from)
         self._shaping = self._amplitudes(shaping)
         self._rates = self._program(f"rates of {type(code).__name__}", rates, *axes)
 
@@ -175,14 +161,13 @@ class StatePredictor(LanePredictor):
             for values in (asked.thetas, asked.moduli)
         ]
         pairs = list(zip(*each, strict=True))
-        packed = [self._packed(asked.numbers, *pair) for pair in pairs]
-        both = (np.concatenate(arrays) for arrays in zip(*packed, strict=True))
-        return Eights(pairs, np.split(places, len(pairs)), *both)
+        packed = self._packed(asked.numbers, asked.thetas, asked.moduli)
+        return Eights(pairs, np.split(places, len(pairs)), packed)
 
     def _felt(self, asked: Asked, eights: Eights, commanded: np.ndarray) -> np.ndarray:
         """Return the rates that each vector feels: as commanded, or as effects shape them."""
         if not np.any(asked.thetas[:, self._shaping]):
-            return np.broadcast_to(commanded, (len(eights.modes), *commanded.shape))
+            return np.broadcast_to(commanded, (LANES * len(eights.pairs), *commanded.shape))
         present = self._fluid.present(asked.thetas)
         return np.concatenate([self._rates(own, present, asked.part) for own, _ in eights.pairs])
 

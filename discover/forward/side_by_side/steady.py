@@ -9,13 +9,12 @@ from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
-from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.code import Code, lanes_last
 from discover.forward.side_by_side.predictors import (
     Asked,
     Eights,
     StatePredictor,
     flows_of,
-    lanes_last,
 )
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.forward.steady_states import (
@@ -268,7 +267,7 @@ class SteadySideBySide(StatePredictor):
 
         def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             row, column = of_run[state], at[state]
-            given = eights.of_lanes(trial, declared) | {
+            given = eights.packed.of_lanes(trial, declared) | {
                 "rate": lanes_last(rate[trial, row, column]),
                 "flow": lanes_last(flows[row]) if part.kinematics is not None else flows,
             }

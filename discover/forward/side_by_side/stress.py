@@ -12,7 +12,7 @@ from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.exponential_weights import KrogstadWeights
 from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
+from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
@@ -252,26 +252,27 @@ class StressSideBySide(LanePredictor):
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return strains, see `Asked.whole`."""
-        return self._by_eights(
-            asked.thetas, (), lambda lanes, used: self._eight(asked, lanes, used)
-        )
+        packed, declared = self._packed(asked.numbers, asked.thetas, asked.moduli), asked.declared
 
-    def _eight(self, asked: Asked, lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
+        def eight(lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
+            return self._eight(asked, lanes, used, packed.of_eight(lanes, declared))
+
+        return self._by_eights(asked.thetas, (), eight)
+
+    def _eight(
+        self, asked: Asked, lanes: np.ndarray, used: np.ndarray, packed: dict[str, np.ndarray]
+    ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
         thetas, part = asked.thetas[lanes], asked.part
-        packed = self._packed(asked.numbers, thetas, asked.moduli[lanes])
-        modes, shared = (np.asarray(array) for array in packed)
-        present = modes_in_use(modes[:, 0].T, len(asked.numbers.modulus))
         times, sample = np.asarray(part.times), np.asarray(part.sample_index)
         last = np.max(sample, axis=1).astype(np.int64)
         imposed = np.broadcast_to(np.asarray(part.imposed), (LANES, *times.shape))
         inertia, given_way = np.zeros((LANES, len(times))), np.zeros(imposed.shape)
         if np.any(thetas[:, self._driving]):
             imposed, inertia, given_way = (np.asarray(of) for of in self._driven(thetas, part))
-        given = {
+        given = packed | {
             "imposed": np.moveaxis(imposed, 0, -1), "inertia": np.moveaxis(inertia, 0, -1),
-            "shared": shared, "mode": modes[present], "last": last,
-            "width": np.diff(times), "flow": flows_of(part.kinematics),
+            "last": last, "width": np.diff(times), "flow": flows_of(part.kinematics),
         }  # fmt: skip
         strain, of_modes = self._code(used, given, asked.whole)
         places = np.arange(len(times))[:, None], sample

@@ -24,7 +24,6 @@ from discover.forward.side_by_side.predictors import (
     LanePredictor,
     MadeOnce,
     flows_of,
-    modes_in_use,
 )
 from discover.forward.side_by_side.step import WEIGHTS
 from discover.programs import on_device
@@ -235,10 +234,11 @@ class SideBySide(LanePredictor):
         times, counts = np.unique(asked.thetas[:, 1], return_counts=True)
         most = int(np.argmax(counts))
         table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
-        laid_out = self._runs(asked.part)
+        laid_out, packed = self._runs(asked.part), self._packed(*asked[:3])
 
         def eight(lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
-            return self._eight(asked.taken(lanes), laid_out, used, table)
+            of_lanes = packed.of_eight(lanes, asked.declared)
+            return self._eight(asked.taken(lanes), laid_out, used, table, of_lanes)
 
         return self._by_eights(asked.thetas, [asked.thetas[:, 1]], eight)
 
@@ -248,14 +248,10 @@ class SideBySide(LanePredictor):
         laid_out: _Runs,
         used: np.ndarray,
         table: tuple[float, np.ndarray | None],
+        packed: dict[str, np.ndarray],
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
-        numbers, thetas, part, runs = asked.numbers, asked.thetas, asked.part, asked.runs
-        packed = self._packed(numbers, thetas, asked.moduli)
-        modes, shared = (np.asarray(array) for array in packed)
-        declared = len(numbers.modulus)
-        if len(modes) > declared:
-            modes = modes[modes_in_use(modes[:, 0].T, declared)]
+        thetas, part, runs, declared = asked.thetas, asked.part, asked.runs, asked.declared
         rate, tool_rate = laid_out.rate, laid_out.tool_rate
         is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
         if part.steps is not None or is_shaped:
@@ -263,8 +259,8 @@ class SideBySide(LanePredictor):
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
-        given = {
-            "rate": rate, "shared": shared, "mode": modes, "table": tabled,
+        given = packed | {
+            "rate": rate, "table": tabled,
             **{name: getattr(laid_out, name) for name in _OF_RUNS},
         }  # fmt: skip
         stress, felt, of_modes = self._code(runs, declared, used, given, asked.whole)
