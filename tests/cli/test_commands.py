@@ -1,6 +1,7 @@
 """The command line: exit codes, one clear message, resuming, JSON."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -290,6 +291,17 @@ def test_a_study_is_read_once_by_its_command(tmp_path, monkeypatch):
     (tmp_path / "s.toml").write_text(STUDY)
     assert "so far" in invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").stderr
     assert read == [tmp_path / "s.toml"]
+
+
+@pytest.mark.slow  # where programs are kept is decided at first use (`tests/door/test_import.py`)
+def test_commands_keep_compiled_programs_in_the_users_cache(tmp_path):
+    code = "from discover.cli import main; main()"
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    environment.pop("JAX_COMPILATION_CACHE_DIR", None)
+    command = [sys.executable, "-c", code, "compare", str(tmp_path / "none.toml"), "--out", "x"]
+    done = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, timeout=120)
+    assert done.returncode == 2  # no such study; the cache is made ready before it is read
+    assert (tmp_path / "cache" / "discover" / "compiled").is_dir()
 
 
 def test_nothing_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
