@@ -62,6 +62,15 @@ def _shapes() -> None:
     first_calls.begin_file()
 
 
+@pytest.fixture(autouse=True, scope="module")
+def panels(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Draw sooner where pictures are not looked at; a file that looks at them overrides this."""
+    with pytest.MonkeyPatch.context() as patch:
+        if _compiles_soon(request.config):
+            fewer_hypotheses.panels_in_a_grid(patch)
+        yield
+
+
 @pytest.fixture
 def as_users_run_it() -> Iterator[None]:
     """Leave annotations unchecked: with the check a wrong type ends before the code under test."""

@@ -1,4 +1,4 @@
-"""Few effects to try, code of these alone, and pages without pictures, where more is not asked."""
+"""Few effects to try, code of these alone, and pages with quick pictures or none."""
 
 from collections.abc import Sequence
 
@@ -18,13 +18,18 @@ def few_candidates(patch: pytest.MonkeyPatch, names: Sequence[str] = FEW) -> Non
     patch.setattr("discover.comparison.hypotheses.named_effects", lambda: effects)
 
 
-def verdict_alone(patch: pytest.MonkeyPatch) -> None:
-    """Leave out what follows from a verdict: a next test, errors elsewhere, twins and physics."""
+def verdict_alone(patch: pytest.MonkeyPatch, *, structure: bool = False) -> None:
+    """Leave out what follows from a verdict: a next test, errors elsewhere, twins and physics.
+
+    And what the flows determine, unless its structure is asked for: a program for each layout.
+    """
     from discover.inference.engine.design import NextTests
 
     patch.setattr("discover.loop.from_posterior.design", lambda *_: NextTests())
     patch.setattr("discover.loop.from_posterior.spread_of_laws", lambda *_: {})
     patch.setattr("discover.comparison.run_comparison.exact_twins", lambda *_: [])
+    if not structure:
+        patch.setattr("discover.comparison.run_comparison.structure_of", lambda *_: None)
     patch.setattr("discover.comparison.learning.physics_of", lambda *_: {"checks": []})
 
 
@@ -39,6 +44,18 @@ def without_pictures(patch: pytest.MonkeyPatch) -> None:
         if name.endswith(("_picture", "_map")) and name != "by_mode_picture":
             patch.setattr(report, name, lambda *_: None)
     patch.setattr("discover.report.comparison.report.comparison_pictures", lambda *_: ([], []))
+
+
+def panels_in_a_grid(patch: pytest.MonkeyPatch) -> None:
+    """Let panels stand in a plain grid, though labels meet there: to place them is half of drawing.
+
+    `tests/report/test_plots.py` draws as users see it, and so does a release.
+    """
+    from matplotlib.figure import Figure
+
+    patch.setattr(
+        "discover.report.plots.style.Figure", lambda **how: Figure(**{**how, "layout": None})
+    )
 
 
 ALSO: set[str] = set()

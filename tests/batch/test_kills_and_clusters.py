@@ -271,46 +271,54 @@ def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
 
 
 def listening(psutil, process):
-    everybody = [process, *process.children(recursive=True)]
-    return [
-        connection
-        for one in everybody
-        for connection in one.net_connections("inet")
-        if connection.status == psutil.CONN_LISTEN
-    ]
+    """The ports at which a process and those that it started wait for somebody."""
+    found = []
+    for one in [process, *process.children(recursive=True)]:
+        with contextlib.suppress(psutil.Error):  # it has ended since
+            found += [c for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
+    return found
 
 
-@pytest.mark.parametrize("n_workers", [1, 2])
-def test_workers_open_no_port_and_a_name_that_is_no_utf_8_costs_no_study_its_place(
-    studies, tmp_path, n_workers
-):
+def looked_at(studies, out, workers):
+    """The result of a batch, the most processes that it had started, and all ports seen open."""
     psutil = pytest.importorskip("psutil")
-    seen = []
+    counts, ports = [], []
 
     def look(label, fraction):
-        seen.append((len(psutil.Process().children()), listening(psutil, psutil.Process())))
+        children = psutil.Process().children()
+        counts.append(sum(one.status() != psutil.STATUS_ZOMBIE for one in children))
+        ports.extend(listening(psutil, psutil.Process()))
 
-    odd = tmp_path / os.fsdecode(b"m\xe9lange.toml")
+    result = batch.run_batch(studies, out, workers=workers, progress=look)
+    with socket.create_server(("127.0.0.1", 0)):  # the control: a port would be seen
+        assert len(listening(psutil, psutil.Process())) == 1
+    return result, max(counts), ports
+
+
+@pytest.fixture
+def strange(tmp_path):
+    """A study whose name is no UTF-8, and one that cannot be read."""
+    odd, broken = (tmp_path / os.fsdecode(name) for name in (b"m\xe9lange.toml", b"\xff.toml"))
     odd.write_text(STUDY.format(0.04))
-    broken = tmp_path / os.fsdecode(b"\xff.toml")
     broken.write_text("[data")
+    return [odd, broken]
+
+
+def test_a_name_that_is_no_utf_8_costs_no_study_its_place_and_one_worker_is_no_process(
+    studies, strange, tmp_path
+):
     out = tmp_path / "out"
-    result = batch.run_batch([*studies[:1], odd, broken], out, workers=n_workers, progress=look)
+    result, started, ports = looked_at([*studies[:1], *strange], out, 1)
     assert [s.status for s in result.studies] == ["done", "done", "failed"]
     assert result.failed[0].input_error
     assert "m\\udce9lange" in (out / "index.html").read_text("utf-8")
     assert len((out / "table.csv").read_text("utf-8").splitlines()) == 4
     assert len(json.loads((out / "batch.json").read_text("utf-8"))["studies"]) == 3
-    assert max(count for count, _ in seen) == (2 if n_workers == 2 else 0)
-    assert all(ports == [] for _, ports in seen)
-    with socket.create_server(("127.0.0.1", 0)):  # the control: a port would be seen
-        assert len(listening(psutil, psutil.Process())) == 1
+    assert (started, ports) == (0, [])
 
 
-@pytest.mark.parametrize("deaths", [1, 99])
-def test_a_worker_killed_while_it_starts_does_not_end_the_batch_and_many_are_told(
-    studies, calm, tmp_path, monkeypatch, deaths
-):
+def dying_workers(tmp_path, monkeypatch, deaths):
+    """Let so many workers be killed while they start."""
     count = tmp_path / "starts.txt"
     count.touch()
     fatal = (
@@ -320,13 +328,26 @@ def test_a_worker_killed_while_it_starts_does_not_end_the_batch_and_many_are_tol
     )
     *python, code = worker_with_stand_in(tmp_path)
     monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
+
+
+def test_workers_open_no_port_and_one_killed_while_it_starts_costs_no_study_its_place(
+    studies, strange, calm, tmp_path, monkeypatch
+):
+    dying_workers(tmp_path, monkeypatch, 1)
+    result, started, ports = looked_at([*studies, *strange], tmp_path / "out", 2)
+    assert [s.status for s in result.studies] == ["done"] * 3 + ["failed", "done", "failed"]
+    assert [s.input_error for s in result.failed] == [False, True]
+    assert (started, ports) == (2, [])
+    found, table = results(tmp_path / "out"), calm.pop("table.csv")
+    assert calm.items() <= found.items()
+    assert set(table.splitlines()) <= set(found["table.csv"].splitlines())
+
+
+def test_many_workers_killed_while_they_start_are_told(studies, tmp_path, monkeypatch):
+    dying_workers(tmp_path, monkeypatch, 99)
     result = batch.run_batch(studies, tmp_path / "out", workers=2)
-    if deaths == 1:
-        assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
-        assert results(tmp_path / "out") == calm
-    else:
-        assert [s.status for s in result.studies] == ["failed"] * 4
-        assert all(s.text.startswith("Several workers died") for s in result.studies)
+    assert [s.status for s in result.studies] == ["failed"] * 4
+    assert all(s.text.startswith("Several workers died") for s in result.studies)
 
 
 def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(

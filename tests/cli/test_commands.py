@@ -145,8 +145,9 @@ def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypat
     def broken(*args, **kwargs):
         raise RuntimeError("it broke\nin two lines")
 
-    monkeypatch.setattr("discover.comparison.learning.train", broken)
-    (tmp_path / "s.toml").write_text(STUDY)
+    monkeypatch.setattr("discover.comparison.run_comparison.search_hypotheses", broken)
+    data_folder(tmp_path / "one")
+    (tmp_path / "s.toml").write_text(ONE_RUN)
     result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
     assert result.exit_code == 1
     assert result.stderr.strip().count("\n") == 0

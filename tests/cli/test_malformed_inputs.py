@@ -31,7 +31,7 @@ def nothing_is_computed():
             yield
 
 
-@settings(max_examples=30, deadline=None, derandomize=True, database=None)
+@settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(kind=st.sampled_from(list(KINDS)), seed=st.integers(0, 10**6))
 def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
     with tempfile.TemporaryDirectory() as root:

@@ -1,10 +1,8 @@
 """Creep, recovery, amplitude sweeps and flow curves in learners and comparisons: by scipy."""
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
+from differences import nearly_giesekus, told_as_differences
 from independent import Giesekus, Modes, PhanThienTanner, start_up
 from independent.sweeps import modulus_of, strain_at
 
@@ -13,8 +11,6 @@ from discover.comparison.known_part import without_instrument
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
-from discover.learners.tbnn_ude.session import initial_law
-from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
 from discover.loop.from_posterior import Ended
 from discover.protocols import imposed_stress, oscillations, steady_rates
 from discover.report.predictions import comparison_predictions
@@ -108,28 +104,10 @@ def test_the_network_is_told_of_creep_and_moduli_as_their_differences_say():
     problem = make_training_problem(
         few_samples(), np.array(MODULUS), np.array(TIME), solvent_viscosity=SOLVENT
     )
-    law = initial_law(jax.random.key(0), 3, True, jnp.ones(8))
-    last = 0.01 * jax.random.normal(jax.random.key(1), law.network.layers[-1].weight.shape)
-    law = eqx.tree_at(  # a fluid that is nearly a Giesekus one
-        lambda tree: (tree.network.layers[-1].weight, tree.constants),
-        law,
-        (last, jnp.zeros(8).at[3].set(0.3)),
-    )
-    rebuild = Rebuild.everything(law)
-    along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
+    along = told_as_differences(problem, nearly_giesekus(0.3), 1e-6, 2e-5)
     # what it misses is its own departure from the law that made them, and the noise
-    missed = (along.recorded - problem.records.recorded)[0]
-    assert float(jnp.max(jnp.abs(missed))) < 0.05 * float(jnp.max(problem.records.recorded[0]))
-    direction, step = jax.random.normal(jax.random.key(2), rebuild.start.shape), 1e-6
-    trials = [rebuild.start + s * direction for s in (step, -step)]
-    ends = [
-        problem.records.residual(states_and_jacobian(trial, rebuild, problem)[0].recorded)
-        for trial in trials
-    ]
-    expected = (ends[0] - ends[1]) / (2.0 * step)
-    size = float(jnp.max(jnp.abs(expected)))
-    _, columns = problem.records.linearised(along.recorded, jacobian)
-    np.testing.assert_allclose(columns @ direction, expected, atol=2e-5 * size)
+    missed = np.abs(along.recorded - problem.records.recorded)[0]
+    assert np.max(missed) < 0.05 * np.max(problem.records.recorded[0])
 
 
 @pytest.mark.slow

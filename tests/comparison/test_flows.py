@@ -16,10 +16,12 @@ from discover.comparison.outcome import place
 from discover.comparison.run_comparison import data_in_words
 from discover.dataset import Dataset, Run
 from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
+from discover.laws import Fluid, make_law
 from discover.protocols import measured_rate, start_up
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.study import parse_study
 from discover.study.data import StudyData
+from discover.study.in_memory import declared_fluid
 
 TIME = np.linspace(0.0, 20.0, 201)
 
@@ -138,14 +140,12 @@ def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, opt
     # what else could explain the runs is not looked for: it changes no run
     monkeypatch.setattr("discover.comparison.hypotheses.MOST_EFFECTS", 0)
     monkeypatch.setattr("discover.comparison.run_comparison.simple_result", lambda *_: None)
-    study = parse_study(
-        {
-            "data": {"synthetic": {"law": "ucm", "samples": 2001, "noise": 0.01}},
-            "compare": {"learners": ["tensor_sindy"], "high_deborah": [1.5], **options},
-        }
-    )
+    compared = {"learners": ["tensor_sindy"], "high_deborah": [1.5], **options}
+    study = parse_study({"data": {"folder": "waves"}, "compare": compared})
+    data = oscillations(2001)
+    declared = declared_fluid(Fluid(make_law("ucm"), 1.0, 1.0), data.dataset)
     with pytest.raises(_Seen) as seen:
-        compare(study)
+        compare(study, data=data, declared=declared)
     assert set(seen.value.args[0]) == {expected}
 
 

@@ -48,7 +48,7 @@ def found(records, tmp_path_factory):
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, 1.0)
     with pytest.MonkeyPatch.context() as patch:
         few_candidates(patch)
-        verdict_alone(patch)
+        verdict_alone(patch, structure=True)
         return dc.compare(
             data, base, held_out=["held.csv"], learners=["tensor_sindy"], library={"degree": 0}
         )

@@ -110,17 +110,23 @@ def test_type_checkers_see_what_runs():
         assert own is there or inspect.signature(own) == inspect.signature(there), name
 
 
-SINGLE = """
+# JAX ran before, and left an array in single precision, then none; what is said goes to one stream
+FIRST_CALL = """
 import sys, jax, jax.numpy as jnp
 first = jnp.ones(3)
+jnp.ones(3).sum().block_until_ready(); jnp.arange(3)
 jax.config.update("jax_compilation_cache_dir", sys.argv[1])
 import discover as dc
 try:
     dc.Fluid
 except dc.InputError as error:
     print("refused:", error)
-jax.config.update("jax_enable_x64", True)
+del first
+data = dc.synthetic_dataset(
+    "giesekus", {"alpha": 0.2}, {"a": dc.start_up(1.0)}, noise=0.01, n_samples=31
+)
 print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype, jax.config.jax_compilation_cache_dir)
+print(jax.config.jax_logging_level)
 with jax.enable_x64(False) if hasattr(jax, "enable_x64") else jax.experimental.disable_x64():
     try:
         dc.TensorSINDy().fit([])
@@ -129,27 +135,19 @@ with jax.enable_x64(False) if hasattr(jax, "enable_x64") else jax.experimental.d
 """
 
 
-def test_arrays_of_single_precision_made_before_are_an_error_and_a_cache_chosen_before_stays(
+def test_arrays_of_single_precision_are_an_error_and_without_them_a_first_call_writes_nothing(
     tmp_path,
 ):
-    first, taken, second = python(SINGLE, str(tmp_path))[0].strip().splitlines()
+    said, error = python(FIRST_CALL, str(tmp_path))
+    first, taken, level, second = said.strip().splitlines()
     assert "1 array of single precision" in first
     assert "jax.config.update('jax_enable_x64', True)" in first
+    # the negative control: JAX may be started before, and a cache chosen before stays
     assert taken.split() == ["float64", str(tmp_path)]
     assert "single precision here" in second
+    # nor is XLA to write anything
+    assert (level, error) == ("CRITICAL", "")
 
-
-# JAX ran before, and left no array in single precision
-FIRST_CALL = """
-import jax, jax.numpy as jnp
-jnp.ones(3).sum().block_until_ready(); jnp.arange(3)
-import discover as dc
-data = dc.synthetic_dataset(
-    "giesekus", {"alpha": 0.2}, {"a": dc.start_up(1.0)}, noise=0.01, n_samples=31
-)
-print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype)
-print(jax.config.jax_logging_level)
-"""
 
 # XLA raises an alarm where it takes more than a second to compute a constant
 SLOW = """
@@ -161,11 +159,6 @@ def constant():
     return jax.lax.reduce_window(ones, 0.0, jax.lax.add, (25, 25), (1, 1), "SAME")
 jax.jit(constant)().block_until_ready()
 """
-
-
-def test_a_first_call_writes_nothing_and_asks_xla_to_write_nothing():
-    # the negative control of the error above: JAX may be started before
-    assert python(FIRST_CALL, DISCOVER_NO_CACHE="1") == ("float64\nCRITICAL\n", "")
 
 
 @pytest.mark.slow

@@ -33,14 +33,17 @@ def test_the_learner_of_the_page_is_trained_judged_reported_and_exported(workpla
     assert "Law found by one term" in latex
 
 
+def compared_alone(workplace, code, more="", status=0):
+    """Compare a learner of a package with nothing beside it."""
+    install(workplace.packages, "mine", code, project("learners", mine="mine"))
+    study = workplace.folder / workplace.study(PAGE, more=more)
+    study.write_text(study.read_text("utf-8").replace('["tensor_sindy", "one_term"]', '["mine"]'))
+    return workplace.run("compare", study.name, "--out", "out", "--quiet", code=status)
+
+
 @pytest.mark.slow
 def test_a_learner_may_be_asked_alone(workplace):
-    install(workplace.packages, "mine", LEARNER_CODE, project("learners", mine="mine"))
-    study = workplace.study(PAGE, more="high_deborah = [1.5]\n")
-    text = (workplace.folder / study).read_text("utf-8")
-    text = text.replace('["tensor_sindy", "one_term"]', '["mine"]')
-    (workplace.folder / study).write_text(text)
-    workplace.run("compare", study, "--out", "out", "--quiet")
+    compared_alone(workplace, LEARNER_CODE, "high_deborah = [1.5]\n")
     found = workplace.json("out/comparison.json")
     assert list(found["learners"]) == ["mine"]
     assert "mine" in (workplace.folder / "out" / "report.html").read_text("utf-8")
@@ -49,12 +52,7 @@ def test_a_learner_may_be_asked_alone(workplace):
 @pytest.mark.slow
 def test_what_returns_no_result_is_an_error_that_names_the_learner(workplace):
     code = "import discover as dc\ndc.register_learner('mine', lambda task: None)\n"
-    install(workplace.packages, "mine", code, project("learners", mine="mine"))
-    study = workplace.study(PAGE)
-    text = (workplace.folder / study).read_text("utf-8")
-    text = text.replace('["tensor_sindy", "one_term"]', '["mine"]')
-    (workplace.folder / study).write_text(text)
-    done = workplace.run("compare", study, "--out", "out", code=2)
+    done = compared_alone(workplace, code, status=2)
     assert "The learner 'mine' must return a LearnerResult; got a NoneType" in done.stderr
 
 

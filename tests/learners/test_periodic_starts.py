@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from independent import Giesekus, oscillation
 
 from discover.dataset import Run
 from discover.laws import TensorBasisNetwork
@@ -21,27 +21,13 @@ PERIOD = 2.0 * np.pi / FREQUENCY
 LIBRARY = build_library(degree=0)
 
 
-def giesekus(strain, times, cycles):
-    """Return σ12 in Pa after so many cycles from rest, by scipy."""
-
-    def change(t, s):
-        rate = strain * FREQUENCY * np.cos(FREQUENCY * t)
-        a, b, c, d = s
-        squared = np.array([a * a + d * d, b * b + d * d, c * c, d * (a + b)])
-        return rate * np.array([2.0 * d, 0.0, 0.0, b + 1.0]) - (s + MOBILITY * squared) / TIME
-
-    later = cycles * PERIOD + times
-    found = solve_ivp(
-        change, (0.0, later[-1]), np.zeros(4), t_eval=later, method="DOP853", rtol=1e-9, atol=1e-11
-    )
-    return MODULUS * found.y[3]
-
-
 def swing(strain, samples=65, cycles=None, noise=0.0):
     times = np.linspace(0.0, PERIOD, samples)
     rate = oscillatory_shear(strain * FREQUENCY, FREQUENCY)
     protocol = after_alternation(rate, PERIOD, times)
-    stress = giesekus(strain, times, 45 if cycles is None else cycles)
+    flow = oscillation(strain * FREQUENCY, FREQUENCY)  # after so many cycles from rest, by scipy
+    later = (45 if cycles is None else cycles) * PERIOD + times
+    stress = Giesekus(MOBILITY, MODULUS, TIME).respond(flow, later).sigma12
     size = noise * np.sqrt(np.mean(stress**2))
     stress = stress + size * np.random.default_rng(int(10 * strain)).standard_normal(samples)
     return Run(f"strain {strain:g}", times, protocol, shear_rates(rate, times), stress)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from independent import Giesekus
 from independent.folders import write_table
-from scipy.integrate import solve_ivp
+from independent.sweeps import strain_at
 
 import discover as dc
 
@@ -21,16 +21,7 @@ BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
 def creep(stress, mobility):
     """Return the strain of a Giesekus fluid with solvent at `CREEP_TIMES`, by scipy."""
     law = Giesekus(mobility, MODULUS, TIME)
-
-    def change(t, y):
-        tensor = np.array([[y[0], y[3], 0.0], [y[3], y[1], 0.0], [0.0, 0.0, y[2]]])
-        rate = (stress - y[3]) / SOLVENT
-        slope = law.stress_change(tensor, rate)
-        return [slope[0, 0], slope[1, 1], slope[2, 2], slope[0, 1], rate]
-
-    return solve_ivp(
-        change, (0.0, CREEP_TIMES[-1]), np.zeros(5), "Radau", CREEP_TIMES, rtol=1e-8, atol=1e-9
-    ).y[4]
+    return strain_at(law, [(0.0, stress)], SOLVENT, CREEP_TIMES)
 
 
 def creep_folder(folder, mobility, draw=0):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from independent import Giesekus
 
 import discover as dc
 from discover.answer.simple_material import recognise
@@ -25,12 +26,9 @@ def flow_curve(stress, rates=RATES, noise=0.02):
     return Run("flow_curve.csv", times, steady_rates(rates), rates, noisy(stress(rates), noise))
 
 
-def giesekus(rates, alpha=0.3, modulus=100.0):
-    """Steady shear stress of a Giesekus fluid with λ = 1 s   [Giesekus 1982, eq. 56]."""
-    own = 8.0 * alpha * (1.0 - alpha) * rates**2
-    chi = np.sqrt((np.sqrt(1.0 + 2.0 * own) - 1.0) / own)
-    f = (1.0 - chi) / (1.0 + (1.0 - 2.0 * alpha) * chi)
-    return modulus * rates * (1.0 - f) ** 2 / (1.0 + (1.0 - 2.0 * alpha) * f)
+def giesekus(rates, alpha):
+    """Steady shear stress of a Giesekus fluid with λ = 1 s."""
+    return np.array([Giesekus(alpha, 100.0).steady_shear(rate)[0] for rate in rates])
 
 
 def sweep(storage, loss, noise=0.01):

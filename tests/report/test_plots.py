@@ -15,6 +15,12 @@ from discover.report.mathtext import formula
 from discover.report.plots.comparison.flows import last_cycle
 from discover.report.plots.style import figure, legend_above, picture, runs_through_decades
 
+
+@pytest.fixture(autouse=True, scope="module")
+def panels():
+    """Place panels as users see them."""
+
+
 DRAW = """
 from discover.report.plots import keep_out_of_the_working_directory
 keep_out_of_the_working_directory()
@@ -52,8 +58,8 @@ def drawn_in(folder):
 
 
 @pytest.fixture(scope="module")
-def calm(tmp_path_factory):
-    return drawn_in(tmp_path_factory.mktemp("calm"))
+def calm():
+    return "".join(f"{part}\n" for part in drawn()).encode()
 
 
 # no such file is read, whatever is in it: that of a pipe would never end

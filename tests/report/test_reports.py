@@ -58,7 +58,7 @@ def comparison():
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.comparison.learning.train", trained)
-        few_candidates(patch)
+        few_candidates(patch, ("giesekus_mobility", "ptt_linear", "stress_gain"))
         return replace(compare(study), name="<script>alert(1)</script>")
 
 

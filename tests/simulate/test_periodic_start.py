@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
+import independent
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -31,17 +31,9 @@ TIMES = np.linspace(0.0, PERIOD, 65)
 
 def giesekus_after(cycles, time, strain):
     """Return σ12 in Pa of a cycle, from rest that many cycles before, by scipy."""
-
-    def change(t, s):
-        rate = strain * FREQUENCY * np.cos(FREQUENCY * t)
-        a, b, c, d = s
-        squared = np.array([a * a + d * d, b * b + d * d, c * c, d * (a + b)])
-        flow = rate * np.array([2.0 * d, 0.0, 0.0, b + 1.0])
-        return flow - (s + MOBILITY * squared) / time
-
-    times = cycles * PERIOD + TIMES
-    found = solve_ivp(change, (0.0, times[-1]), np.zeros(4), t_eval=times, rtol=1e-9, atol=1e-11)
-    return MODULUS * found.y[3]
+    law = independent.Giesekus(MOBILITY, MODULUS, time)
+    flow = independent.oscillation(strain * FREQUENCY, FREQUENCY)
+    return law.respond(flow, cycles * PERIOD + TIMES).sigma12
 
 
 def alternating(strain):

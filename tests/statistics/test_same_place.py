@@ -48,21 +48,17 @@ def test_a_loud_start_that_differs_from_run_to_run_is_noise():
     assert taken <= 3
 
 
-def test_knocks_at_different_places_are_outliers_and_not_structure():
+@pytest.mark.parametrize(
+    ("places", "verdict", "outliers"),
+    [((7, 19, 30, 41, 52), "explained", 5), ((30,) * 5, "unexplained", 0)],
+)
+def test_knocks_at_different_places_are_outliers_and_at_one_place_structure(
+    places, verdict, outliers
+):
     left = noise(1)
-    for run, at in enumerate((7, 19, 30, 41, 52)):
-        left[run, at] += 0.5
+    left[np.arange(5), places] += 0.5
     told = what_is_left([*left], [*(1.0 - left)])
-    assert told.verdict == "explained"
-    assert told.outliers == 5
-
-
-def test_knocks_at_one_place_are_structure():
-    left = noise(1)
-    left[:, 30] += 0.5
-    told = what_is_left([*left], [*(1.0 - left)])
-    assert told.verdict == "unexplained"
-    assert told.outliers == 0
+    assert (told.verdict, told.outliers) == (verdict, outliers)
 
 
 def test_few_samples_do_not_hide_a_misfit_in_the_noise():

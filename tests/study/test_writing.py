@@ -90,29 +90,42 @@ def command(action):
     return CliRunner().invoke(app, [])
 
 
-@pytest.mark.parametrize("step", ["write", "fsync"])
-def test_a_full_disk_is_one_line_that_names_the_file_and_loses_nothing(tmp_path, monkeypatch, step):
-    folder = RunFolder(tmp_path, "one")
-    folder.save("first", {"x": 1})
+FULL = OSError(errno.ENOSPC, "No space left on device")
 
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
+
+@pytest.mark.parametrize(
+    ("step", "error", "code", "words"),
+    [
+        ("write", FULL, 1, ["No space left on device", "part.json"]),
+        ("fsync", FULL, 1, ["No space left on device", "part.json"]),
+        ("replace", FULL, 1, ["No space left on device", "part.json"]),
+        ("fsync", KeyboardInterrupt(), 130, ["run the same command again"]),
+    ],
+)
+@pytest.mark.parametrize("before", [{"x": 1}, None])
+def test_a_full_disk_and_an_interrupt_while_writing_are_one_line_and_keep_what_was_there(
+    tmp_path, monkeypatch, step, error, code, words, before
+):
+    folder = RunFolder(tmp_path, "one")
+    if before:
+        folder.save("part", before)
+
+    def stop(*_):
+        raise error
 
     def work() -> None:
         with monkeypatch.context() as patch:
-            if step == "fsync":
-                patch.setattr(os, "fsync", full)
+            if step == "write":
+                patch.setattr("discover.study.atomic.os.fdopen", lambda *a, **k: _FullDisk(stop))
             else:
-                patch.setattr("discover.study.atomic.os.fdopen", lambda *a, **k: _FullDisk(full))
-            folder.save("second", {"x": 2})
+                patch.setattr(os, step, stop)
+            folder.save("part", {"x": 2})
 
     result = command(work)
-    assert result.exit_code == 1
+    assert result.exit_code == code
     assert result.stderr.count("\n") == 1
-    assert "No space left on device" in result.stderr
-    assert "second.json" in result.stderr
-    assert folder.load("first") == {"x": 1}
-    assert folder.load("second") is None
+    assert all(word in result.stderr for word in words)
+    assert folder.load("part") == before
     assert not list(tmp_path.rglob(f"*{PART_SUFFIX}"))
 
 
@@ -132,26 +145,6 @@ def test_a_folder_in_the_place_of_a_result_is_the_users_to_remove(tmp_path):
     with pytest.raises(InputError, match=r"part\.json is no plain file"):
         write_text(tmp_path / "part.json", "x")
     assert [path.name for path in tmp_path.iterdir()] == ["part.json"]
-
-
-def test_an_interrupt_while_writing_keeps_what_was_there(tmp_path, monkeypatch):
-    folder = RunFolder(tmp_path, "one")
-    folder.save("part", {"x": 1})
-
-    def work() -> None:
-        def stop(*_):
-            raise KeyboardInterrupt
-
-        with monkeypatch.context() as patch:
-            patch.setattr(os, "fsync", stop)
-            folder.save("part", {"x": 2})
-
-    result = command(work)
-    assert result.exit_code == 130
-    assert result.stderr.count("\n") == 1
-    assert "run the same command again" in result.stderr
-    assert folder.load("part") == {"x": 1}
-    assert not list(tmp_path.rglob(f"*{PART_SUFFIX}"))
 
 
 # the module alone: the package would import much before the first write
