@@ -269,12 +269,13 @@ class Ended(Path):
     def noise(self) -> float:
         """Relative noise, mean over the fitted runs.
 
-        Where a residual is left, only what of it changes from sample to sample.
+        Where a residual is left, of a law or of a model of what is no signal, only what of it
+        changes from sample to sample.
         """
         if (known := self.posterior.problem.noise) is not None:
             return known
         sizes = self.fit.noise.sizes
-        if self.verdict == "unexplained":
+        if self.verdict in ("unexplained", "no_signal"):
             left = [r.relative_residual[-1] for r in self.records if not r.held_out]
             told = [len(values) >= FEWEST_FAST for values in left]
             sizes = np.where(told, np.minimum([fast_part(values) for values in left], sizes), sizes)

@@ -151,12 +151,12 @@ def _of_predicted_n1(result: Any) -> str:
     apart = differing(result, "N1")
     if apart is None or not normal_stress_settled(result) or not _is_in_reach(result, "N1"):
         return ""
-    to = f" to {percent_of(apart)}" if apart > _EXACT else ""
-    return f"Measure N1 at {_fastest(_sheared(result))}: the law predicts it{to}."
+    within = percent_of(max(apart, _MEASURABLE))
+    return f"Measure N1 at {_fastest(_sheared(result))}: the law predicts it to within {within}."
 
 
-_EXACT = 5e-4
-"""Relative difference between laws that is none."""
+_MEASURABLE = 0.01
+"""Relative difference in a normal stress below which none is measured."""
 
 
 def _sheared(result: Any) -> list[RunRecord]:

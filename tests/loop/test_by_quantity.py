@@ -203,7 +203,9 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
         FITTED, verdict="effects_added", stages=(law,), spread_of_laws=known,
         explanations=SimpleNamespace(holding=lambda names: None),
     )  # fmt: skip
-    assert what_to_measure_next(found) == "Measure N1 at 1 1/s: the law predicts it to 1.4 %."
+    assert (
+        what_to_measure_next(found) == "Measure N1 at 1 1/s: the law predicts it to within 1.4 %."
+    )
     # not where it cannot be measured, was, or other effects make the same records
     check = "To confirm linear PTT, extend it."
     known["N1"] = replace(known["N1"], stress=0.5)
