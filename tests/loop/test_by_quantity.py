@@ -204,7 +204,8 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
         explanations=SimpleNamespace(holding=lambda names: None),
     )  # fmt: skip
     assert (
-        what_to_measure_next(found) == "Measure N1 at 1 1/s: the law predicts it to within 1.4 %."
+        what_to_measure_next(found)
+        == "Measure N1 at 1 1/s: the law predicts it, and no run tested it."
     )
     # not where it cannot be measured, was, or other effects make the same records
     check = "To confirm linear PTT, extend it."
