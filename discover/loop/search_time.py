@@ -12,12 +12,14 @@ from discover.progress import Crowding
 
 
 class _Part(NamedTuple):
-    """What follows a search: fits of one hypothesis, and seconds where its programs are compiled.
+    """What follows a search: fits of one hypothesis and seconds besides.
 
-    `share`: most of its fits over those of the search.
+    `compiling`: further seconds where all its programs are compiled. `share`: most of its fits over
+    those of the search.
     """
 
     fits: float
+    seconds: float = 0.0
     compiling: float = 0.0
     share: float = 1.0
 
@@ -32,7 +34,7 @@ hypothesis."""
 _WEIGHED, _WEIGHED_ALONE = _Part(140.0, share=1.2), _Part(10.0)
 """What is weighed after the search: with runs held out, when all are fitted again, or without."""
 
-_CURVES, _BANDS = _Part(20.0, 1.5, 0.5), _Part(15.0, 3.0, 0.7)
+_CURVES, _BANDS = _Part(20.0, 0.3, 1.2, 0.5), _Part(15.0, 0.5, 2.5, 0.7)
 """Curves of one variable; bands, intervals and the next test. All these were measured on two cores,
 with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
 two-mode PTT and noise. Seconds are those of the machine of `slowness`."""
@@ -122,7 +124,7 @@ class SearchTime:
         if self._follows and self._searches < 2:
             fits += self._first or self._done - self._before + fits
         fits += sum(map(self._of, self._reports))
-        seconds = self._near * self._compiling(self._reports)
+        seconds = self._besides(self._reports)
         fits += (self._rounds - 1) * (self._done - self._round_before[0] + fits)
         seconds += (self._rounds - 1) * (self._seconds - self._round_before[1] + seconds)
         passed, crowding = self._clock() - self._begun, self._crowding()
@@ -154,7 +156,8 @@ class SearchTime:
 
     def _pass(self, parts: list[_Part]) -> None:
         self._done += sum(map(self._of, parts))
-        self._seconds += self._near * self._compiling(parts)
+        self._seconds += self._besides(parts)
 
-    def _compiling(self, parts: list[_Part]) -> float:
-        return self._compiled() * sum(part.compiling for part in parts)
+    def _besides(self, parts: list[_Part]) -> float:
+        compiled = self._compiled()
+        return self._near * sum(part.seconds + compiled * part.compiling for part in parts)
