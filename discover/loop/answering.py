@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.answer import (
     Answer,
@@ -246,7 +247,11 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         if core is not None:
             title = LAWS[LAW_OF_EFFECT[core]].title
         elif is_ucm and (structure := next((one for one in names if one in STRUCTURES), None)):
-            first, known = [effect_title(structure)], [*STRUCTURES]
+            known = [*STRUCTURES]
+            if shows_recovery(result.records):
+                title = "thixotropic Maxwell"
+            else:
+                first = [effect_title(structure)]
         added = [effect_title(name) for name in names if name not in known]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)
@@ -261,6 +266,23 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
+
+
+def shows_recovery(records: Sequence[RunRecord]) -> bool:
+    """Return whether fitted runs show what recovers: shear that falls to slower shear or to rest.
+
+    A fluid that flow softens is thixotropic if it does   [Mewis & Wagner 2009, Adv. Colloid
+    Interface Sci. 147, 214].
+    """
+    return any(_falls(r.rate) for r in records if r.control == "rate" and not r.held_out)
+
+
+def _falls(rate: Float[np.ndarray, " n"]) -> bool:
+    """Return whether a rate that hardly turns ends, over a tenth of its samples, below half."""
+    last = np.median(rate[-max(len(rate) // 10, 1) :])
+    ways = abs(np.min(rate)), abs(np.max(rate))
+    swings_past = min(ways) if np.min(rate) < 0.0 < np.max(rate) else 0.0  # as a motor does
+    return bool(abs(last) < 0.5 * max(ways) and swings_past < 0.2 * max(ways))
 
 
 def shows_a_derivative(result: Any) -> bool:

@@ -131,10 +131,10 @@ def _of_the_instrument(result: Any) -> str:
 def _of_another_stress(result: Any) -> str:
     """Return the stress that laws differ in which fit as well; empty where none is open.
 
-    And where they miss by more than the tolerance what was measured, which then comes first.
+    And where they miss what was measured by more than tolerance and noise: it then comes first.
     """
     missed = with_unseen(result)
-    if missed is not None and missed.size > result.tolerance:
+    if missed is not None and missed.size > max(result.tolerance, result.noise_floor):
         return ""
     for kind, title in _OTHERS.items():
         apart = differing(result, kind)

@@ -193,6 +193,8 @@ def test_what_was_measured_comes_before_another_stress_where_it_is_not_described
     found.discrepancy["by_run"] = {"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4}
     told = what_to_measure_next(found)
     assert told == "Repeat fast with another gap, to separate instrument and fluid."  # no gap there
+    # a miss within the noise is none to look into
+    assert what_to_measure_next(result(FITTED, noise_floor=0.1)).startswith("Measure N1")
 
 
 def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():

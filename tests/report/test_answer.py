@@ -213,7 +213,7 @@ def test_a_best_classical_law_whose_flow_curve_has_a_maximum_says_so(alpha, told
     assert ("(flow curve with a maximum)" in said.best_classical[0]) is told
 
 
-def test_a_maxwell_fluid_with_a_structure_is_known_by_what_it_does_not_as_thixotropic():
+def test_a_maxwell_fluid_with_a_structure_is_thixotropic_only_where_runs_show_recovery():
     result = loop_result()
     names = ("solvent_viscosity", "thixotropic_relaxation")
     stages = [replace(result.stages[0], effect=one, kind="constitutive") for one in names]
@@ -225,6 +225,20 @@ def test_a_maxwell_fluid_with_a_structure_is_known_by_what_it_does_not_as_thixot
     assert both.title == said
     assert both.constants[-1].said.endswith("(two-time softened relaxation)")
     assert not any("thixotrop" in effect_title(name) for name in STRUCTURES)
+    record = found.records[0]
+    down = np.where(record.time < record.time[1], 10.0, 1.0)
+    rates = {
+        "a step down": (down, True),
+        "one past which the motor swings": (
+            np.where(record.time == record.time[1], -0.5, down),
+            True,
+        ),
+        "start-up": (np.ones(len(record.time)), False),
+        "oscillation": (np.cos(np.linspace(0.0, 20.0, len(record.time))), False),
+    }
+    for rate, recovers in rates.values():
+        one = replace(found, records=(replace(record, rate=rate),))
+        assert one.answer.title.startswith("thixotropic Maxwell") is recovers
 
 
 def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_has_the_worst_run():
