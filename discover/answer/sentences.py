@@ -207,7 +207,7 @@ def usable(answer: Any) -> list[str]:
         fitted = ("shear" if name == "sigma12" else name) in flows
         most = _USELESS if one.is_measured else answer.tolerance
         if fitted if one.inside is None else one.inside <= most:
-            found.append(symbol)
+            found.append(symbol if one.is_measured else f"{symbol} (untested)")
     return found + [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
 
 
