@@ -147,9 +147,13 @@ _EFFECTS = {
     "rate_rise_time": "slow motor",
     "relaxation_mode": "added mode",
     "solvent_viscosity": "Newtonian part",
-    "thixotropic_modulus_by_stress": "stress-driven thixotropic modulus",
-    "thixotropic_relaxation_by_stress": "stress-driven thixotropic relaxation",
-    "thixotropic_relaxation_two_times": "two-time thixotropic relaxation",
+    # what runs show; that it is thixotropy would take recovery at rest
+    "thixotropy": "flow softening",
+    "thixotropic_modulus": "rate-softened modulus",
+    "thixotropic_modulus_by_stress": "stress-softened modulus",
+    "thixotropic_relaxation": "rate-softened relaxation",
+    "thixotropic_relaxation_by_stress": "stress-softened relaxation",
+    "thixotropic_relaxation_two_times": "two-time softened relaxation",
 }
 
 

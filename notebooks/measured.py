@@ -89,7 +89,6 @@ if melt is not None:
         learners=["tensor_sindy"],
         library={"degree": 0},
         max_terms=2,
-        next={"flows": ["start_up"]},
     )
     print(comparison.verdict, "| not determined:", ", ".join(comparison.undetermined))
 comparison.terms_table() if comparison else None

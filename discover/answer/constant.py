@@ -28,6 +28,7 @@ class Constant:
     letter: str = ""  # LaTeX, as the equation of its effect has it
     meaning: str = ""  # in a few words, where its letter is not one of the field
     end: Literal["", "low", "high"] = ""  # of its physical range, where the value is there
+    over_modes: Span | None = None  # least and largest, where it differs from mode to mode
 
     @property
     def is_term(self) -> bool:
@@ -76,6 +77,10 @@ class Constant:
         """
         if not self.determined:
             return f"{significant(self.reciprocal.value, 2)}{self.reciprocal._unit}"
+        if self.over_modes is not None:
+            low, high = (significant(end, 2) for end in self.over_modes)
+            small = abs(self.over_modes[0]) < _SMALL * abs(self.over_modes[1])
+            return f"{'up to ' if small else f'{low}–'}{high}{self._unit}"
         if (other := self.reciprocal) is not self:
             return other.number
         return f"{self._plain(self.value)}{self._unit}"
@@ -85,6 +90,8 @@ class Constant:
         """95 % interval, or a dash, or that it is not determined."""
         if not self.determined:
             return "not determined alone"
+        if self.over_modes is not None:
+            return "by mode"
         if (other := self.reciprocal) is not self:
             return other.interval
         if self.bound:
@@ -133,8 +140,10 @@ class Constant:
 
     @property
     def has_interval(self) -> bool:
-        """Whether it was fitted, so that its value is uncertain."""
-        return self.determined and self.ci95 is not None and self.ci95[0] < self.ci95[1]
+        """Whether it was fitted, so that its one value is uncertain."""
+        if not self.determined or self.ci95 is None or self.over_modes is not None:
+            return False
+        return self.ci95[0] < self.ci95[1]
 
     @property
     def text(self) -> str:
@@ -145,7 +154,9 @@ class Constant:
         """Return symbol, value and interval, with what stands before the interval."""
         if not self.determined:
             return f"{self.symbol} not determined"
-        return f"{self.symbol}{'' if self.bound else ' ='} {self.measured(level)}"
+        measured = self.measured(level)
+        equals = "" if self.bound or measured.startswith("up to") else " ="
+        return f"{self.symbol}{equals} {measured}"
 
     def measured(self, level: str) -> str:
         """Return value and interval, with what stands before the interval.
@@ -154,7 +165,7 @@ class Constant:
         slip, and no other value goes with the other constants.
         """
         if not self.has_interval:
-            return self.number
+            return f"{self.number}{'' if self.over_modes is None else ' by mode'}"
         if not self.bound and not self.is_skewed:
             return f"{self.number} ({level}{self.interval})"
         level = f"{level.strip()}, " if level.strip() else ""
@@ -182,6 +193,17 @@ class Constant:
         )
 
     @property
+    def is_vague(self) -> bool:
+        """Whether its interval is wider than its middle: a factor of three, or zero within.
+
+        Such a constant has hardly a value, so that no first line gives it one.
+        """
+        if not self.has_interval or self.ci95 is None:
+            return False
+        low, high = self.ci95
+        return high - low > 0.5 * abs(low + high)
+
+    @property
     def bound(self) -> str:
         """Bound that remains of a value at an end of its physical range; empty of one inside.
 
@@ -207,6 +229,8 @@ class Constant:
 _MINUS = "−"
 _OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
 _DECADE = 10.0
+_SMALL = 0.01
+"""Share of the largest of several values below which the least is none."""
 _NEAR_END = 0.1
 """Share of an interval at its ends in which a value is not near its middle."""
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}

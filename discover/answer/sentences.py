@@ -1,9 +1,17 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from discover.answer.modes_in_words import (
+    MOST_SHIFTS,
+    degrees,
+    is_plain,
+    reduced_to,
+    shifted,
+    short,
+    span,
+)
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
 _MOST_WORDS, _MOST_CONSTANTS = 60, 3
@@ -39,7 +47,7 @@ def quality(answer: Any) -> str:
 def _first_lines(answer: Any) -> tuple[str, str]:
     """Return both, as short as need be: what gives way is in the table."""
     told = "", ""
-    for most, brief in ((_MOST_CONSTANTS, False), (2, False), (1, False), (1, True)):
+    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2)):
         parts = description(answer, brief), answer.failed, where(answer)
         told = _law(answer, most), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
@@ -67,11 +75,11 @@ def _law(answer: Any, most: int) -> str:
         if (not several if one.name in _OF_MODES else not answer.is_empirical)
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
-    certain = [one for one in own if one.determined and not one.is_wide]
+    certain = [one for one in own if one.determined and not one.is_vague]
     named = constants(certain[:most])
     if several and not answer.is_empirical:
         named.append(counted(len(answer.modes), "mode"))
-    elif answer.modes and not several and not own and not _is_plain(answer):
+    elif answer.modes and not several and not own and not is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
@@ -81,47 +89,10 @@ def _law(answer: Any, most: int) -> str:
     return f"{', '.join([title, *named])}."
 
 
-def degrees(temperature: float) -> str:
-    """Return a temperature in °C."""
-    return f"{temperature:.0f} °C".replace("-", "−")
-
-
 def constants(several: Sequence[Any]) -> list[str]:
     """Return constants in words; the first interval says that it is one of 95 %."""
     first = next((one for one in several if one.has_interval), None)
     return [one.with_interval(_LEVEL if one is first else "") for one in several]
-
-
-def shifts(answer: Any) -> list[tuple[float, float]]:
-    """Return temperatures of shifted runs with their factors: of many the first and the last."""
-    found = [*answer.shift_factors.items()]
-    return found if len(found) <= _MOST_SHIFTS else [found[0], found[-1]]
-
-
-def reduced_to(answer: Any) -> str:
-    """Return the temperature to which times and rates of shifted runs were reduced."""
-    at = answer.temperature_C
-    return "the reference temperature" if at is None else degrees(at)
-
-
-def shortened(factor: float) -> str:
-    """Return what a shift factor does to times, in words."""
-    by, way = (1.0 / factor, "shorter") if factor < 1.0 else (factor, "longer")
-    return f"{way} by a factor of {significant(by, 3)}"
-
-
-_MOST_SHIFTS = 3
-
-
-def shifted(answer: Any) -> str:
-    """Return at which temperature times hold, and what shortens them; empty where nothing does."""
-    if not answer.shift_factors:
-        return ""
-    said = [
-        f"{shortened(float(factor))} at {degrees(at)} (a_T = {significant(factor, 3)})"
-        for at, factor in shifts(answer)
-    ]
-    return f"Moduli and times are those at {reduced_to(answer)}; times are {', '.join(said)}."
 
 
 def is_a_set(answer: Any) -> bool:
@@ -138,29 +109,24 @@ def is_a_set(answer: Any) -> bool:
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
 
 
-def description(answer: Any, brief: bool = False) -> str:
+def description(answer: Any, brief: int = 0) -> str:
     """Return how well the law describes the runs, corrected for what, and if that is enough.
 
-    `brief`: without what the table has.
+    `brief`: 1 without counts of runs and names of suspects, 2 without other rates too.
     """
     if not answer.title:
         return ""
     noise = "" if answer.noise is None else percent_of(answer.noise)
     found = answer.discrepancy
     if answer.fits_to_the_noise:
-        said = f"Fits within noise{f' ({noise})' if noise else ''}"
+        said = f"Fits within the noise{f' of {noise}' if noise else ''}"
     elif found is None or not found.size:
         said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
         size = f"{percent_of(found.size)}{f' ({_LEVEL}{low}–{high} %)' if low != high else ''}"
-        one = answer.expected("sigma12")
-        if not found.unseen:  # of fitted runs it is no error that a prediction could have
-            said = _OF_FITTED + size
-        elif one.beyond is not None and one.beyond_at.startswith(MEASURED_AT) and not brief:
-            said = f"Error: {found.unseen} {size}, faster ones {_at_most(one.beyond)}"
-        else:
-            said = f"Error: {found.unseen} {size}"
+        # of fitted runs it is no error that a prediction could have
+        said = _of_unseen(answer, size, brief) if found.unseen else _OF_FITTED + size
         # an error below the noise is known no better than that
         said += f"; noise {noise}" if noise and answer.noise > found.size else ""
     parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
@@ -170,7 +136,29 @@ def description(answer: Any, brief: bool = False) -> str:
 _OF_FITTED = "Residual of the fitted runs "
 
 
-def _corrected(answer: Any, brief: bool) -> str:
+def _of_unseen(answer: Any, size: str, brief: int) -> str:
+    """Return the errors of unseen runs: of each quantity where several were measured, else of all.
+
+    And the worst of these, where one misses the tolerance, and those of faster runs.
+    """
+    each = [
+        f"{symbol} {_at_most(one.inside)}"
+        for name, symbol in SYMBOLS.items()
+        if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
+    ]
+    told = each if len(each) > 1 else [size]
+    if (worst := worst_run(answer)) is not None:
+        told.append(f"worst run {worst[1]}")
+    stress = answer.expected("sigma12")
+    if stress.beyond is not None and stress.beyond_at.startswith(MEASURED_AT) and brief < _BRIEFEST:
+        told.append(f"faster ones {_at_most(stress.beyond)}")
+    return f"Error on {answer.discrepancy.unseen}: {', '.join(told)}"
+
+
+_BRIEFEST = 2
+
+
+def _corrected(answer: Any, brief: int) -> str:
     """Return what of the instrument the errors were corrected for; empty where for nothing."""
     names = [effect_title(one.effect) for one in answer.suspects]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
@@ -181,7 +169,7 @@ def _corrected(answer: Any, brief: bool) -> str:
 _MOST_SUSPECTS = 2
 
 
-def tolerance(answer: Any, brief: bool = False) -> str:
+def tolerance(answer: Any, brief: int = 0) -> str:
     """Return whether the tolerance is met, and unless `brief`, in how many runs it is not."""
     if answer.adequate is None:
         return ""
@@ -219,7 +207,7 @@ def usable(answer: Any) -> list[str]:
         fitted = ("shear" if name == "sigma12" else name) in flows
         most = _USELESS if one.is_measured else answer.tolerance
         if fitted if one.inside is None else one.inside <= most:
-            found.append(symbol)
+            found.append(symbol if one.is_measured else f"{symbol} (untested)")
     return found + [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
 
 
@@ -231,7 +219,8 @@ def where(answer: Any) -> str:
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     only = " only" * (len(quantities) == 1)
-    return f"Use for {listed(quantities)}{only}, {place}."
+    use = "If that suffices, use" if answer.adequate is False else "Use"
+    return f"{use} for {listed(quantities)}{only}, {place}."
 
 
 def _place(answer: Any) -> str:
@@ -240,15 +229,15 @@ def _place(answer: Any) -> str:
     In numbers without units where the modes have none.
     """
     one = answer.range
-    if _is_plain(answer) and one.weissenberg is not None:
+    if is_plain(answer) and one.weissenberg is not None:
         numeral = "λω" if one.oscillates else "λ/duration"
         slow = "" if one.deborah is None else f", De = {numeral} = {span(one.deborah)}"
-        return f"Wi = λγ̇ ≤ {_short(one.weissenberg[1])}{slow}"
+        return f"Wi = λγ̇ ≤ {short(one.weissenberg[1])}{slow}"
     if not one.by_temperature:
         reduced = f" reduced to {reduced_to(answer)}" if answer.shift_factors else ""
         return f"{rates}{reduced}" if (rates := _rates(one)) else ""
     told = [f"{_rates(own)} at {degrees(at)}" for at, own in one.by_temperature.items()]
-    return listed(told) if len(told) <= _MOST_SHIFTS else f"{told[0]} to {told[-1]}"
+    return listed(told) if len(told) <= MOST_SHIFTS else f"{told[0]} to {told[-1]}"
 
 
 def _rates(one: Any) -> str:
@@ -258,58 +247,6 @@ def _rates(one: Any) -> str:
         several = any(sign in (told := span(frequencies)) for sign in ("–", " to "))
         found.append(f"{'' if several else 'oscillating at '}{told} rad/s")
     return ", ".join(found)
-
-
-def _is_plain(answer: Any) -> bool:
-    """Return whether the law has no units: one mode of 1 Pa and 1 s."""
-    return [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
-
-
-def span(ends: tuple[float, float]) -> str:
-    """Return a range in numbers of two digits."""
-    low, high = map(_short, ends)
-    # else the power of the one would be taken for that of both
-    dash = " to " if "×" in high and "×" not in low else "–"
-    return low if low == high else f"{low}{dash}{high}"
-
-
-def _short(value: float) -> str:
-    return significant(value, 2)
-
-
-def linear_part(answer: Any) -> str:
-    """Return moduli, times and solvent of a law: of few modes all, of more from where to where."""
-    found = []
-    modes = in_order(answer)
-    for letter, unit, values in (
-        ("G", "Pa", [mode.modulus_Pa for mode in modes]),
-        ("λ", "s", [mode.relaxation_time_s for mode in modes]),
-    ):
-        if len(values) > FEW_MODES:
-            low, high = (f"{_short(end)} {unit}" for end in (min(values), max(values)))
-            found.append(f"{letter} from {low} to {high}")
-        elif values:
-            told = listed([as_constant(answer, one) for one in values])
-            found.append(f"{letter} = {told} {unit}")
-    if answer.solvent_viscosity_Pa_s:
-        found.append(f"η_s = {as_constant(answer, answer.solvent_viscosity_Pa_s)} Pa s")
-    return ", ".join(found)
-
-
-FEW_MODES = 3
-"""Relaxation modes up to which all are listed."""
-
-
-def in_order(answer: Any) -> list[Any]:
-    """Return the modes from the shortest time to the longest."""
-    return sorted(answer.modes, key=lambda mode: mode.relaxation_time_s)
-
-
-def as_constant(answer: Any, value: float) -> str:
-    """Return a modulus, time or viscosity with the digits that it has among the constants."""
-    own = (one for one in answer.constants if math.isclose(one.value, value, rel_tol=1e-6))
-    one = next(own, None)
-    return significant(value, 3 if one is None else one.digits)
 
 
 def _over_tolerance(answer: Any) -> dict[str, float]:

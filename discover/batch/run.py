@@ -27,10 +27,10 @@ from discover.study.run_folder import RunFolder
 from discover.study.schema import Study, Verdict
 from discover.validation import validated
 
-_DRAWING = {"compare": 8.0, "close-loop": 4.5}
+_DRAWING = {"compare": 3.3, "close-loop": 1.1}
 """Seconds in which the pictures of a page are drawn, by task, on a machine of its own."""
 
-_DEMO_LOOP = 7.5
+_DEMO_LOOP = 2.6
 """Seconds that the loop of the demonstration takes after its comparison, likewise."""
 
 _PAGE = "report.html"

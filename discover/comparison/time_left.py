@@ -7,7 +7,7 @@ from discover.compilation_cache import compiled_share
 from discover.loop.search_time import SearchTime
 from discover.progress import Crowding, Progress, by_time
 
-_LEARN, _WEIGH = (6.0, 20.0, 0.2), (6.5, 14.0, 0.25)
+_LEARN, _WEIGH = (2.4, 8.0, 0.2), (2.6, 5.6, 0.25)
 """Seconds in which learners learn, and in which laws are weighed: a constant, and what compiling
 adds, which a crowded machine prolongs, and a share of the search's. Measured on the demonstration
 and on LDPE."""

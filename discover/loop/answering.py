@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.answer import (
     Answer,
@@ -242,16 +243,20 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         names = [stage.effect for stage in in_fluid]
         is_ucm = base is not None and base[0] == "ucm"
         core = next((one for one in names if is_ucm and one in LAW_OF_EFFECT), None)
-        known = [core]
+        known, first = [core], []
         if core is not None:
             title = LAWS[LAW_OF_EFFECT[core]].title
-        elif is_ucm and any(name in STRUCTURES for name in names):
-            title, known = "thixotropic Maxwell", [*STRUCTURES]
+        elif is_ucm and (structure := next((one for one in names if one in STRUCTURES), None)):
+            known = [*STRUCTURES]
+            if shows_recovery(result.records):
+                title = "thixotropic Maxwell"
+            else:
+                first = [effect_title(structure)]
         added = [effect_title(name) for name in names if name not in known]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)
-        if added:
-            title = f"{title} with {listed(added)}"
+        if first or added:
+            title = f"{title} with {listed([*first, *added])}"
         if len(added) > _MOST_ADDED or any(one.is_term for one in found):
             title = EMPIRICAL + title
         return None, title, tuple(found)
@@ -261,6 +266,23 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
+
+
+def shows_recovery(records: Sequence[RunRecord]) -> bool:
+    """Return whether fitted runs show what recovers: shear that falls to slower shear or to rest.
+
+    A fluid that flow softens is thixotropic if it does   [Mewis & Wagner 2009, Adv. Colloid
+    Interface Sci. 147, 214].
+    """
+    return any(_falls(r.rate) for r in records if r.control == "rate" and not r.held_out)
+
+
+def _falls(rate: Float[np.ndarray, " n"]) -> bool:
+    """Return whether a rate that hardly turns ends, over a tenth of its samples, below half."""
+    last = np.median(rate[-max(len(rate) // 10, 1) :])
+    ways = abs(np.min(rate)), abs(np.max(rate))
+    swings_past = min(ways) if np.min(rate) < 0.0 < np.max(rate) else 0.0  # as a motor does
+    return bool(abs(last) < 0.5 * max(ways) and swings_past < 0.2 * max(ways))
 
 
 def shows_a_derivative(result: Any) -> bool:
@@ -329,6 +351,7 @@ def _constants(
             _of_mode(one, name, spelled.get(name, "")),
             meaning=_of_mean_mode(one, _meaning(effect, known[name]) if name in known else ""),
             end=one.at_end if isinstance(one, StageParameter) else "",
+            over_modes=one.span if _differs(one) else None,
         )
         for name, one in parameters.items()
     )
@@ -336,16 +359,18 @@ def _constants(
 
 def _of_mode(one: Any, name: str, letter: str) -> str:
     """Return the letter of a constant, with the index of the mode where it differs."""
-    differs = isinstance(one, ConstantByMode) and one.degree
-    return f"{letter or readable(name)}_k" if differs else letter
+    return f"{letter or readable(name)}_k" if _differs(one) else letter
+
+
+def _differs(one: Any) -> bool:
+    """Return whether a constant differs from mode to mode."""
+    return isinstance(one, ConstantByMode) and bool(one.degree)
 
 
 def _of_mean_mode(one: Any, meaning: str) -> str:
-    """Return what a constant is; of one that differs from mode to mode, of which it is shown."""
-    if not isinstance(one, ConstantByMode) or not one.degree:
-        return meaning
-    place = f"at λ = {significant(one.mean_time_s, 2)} s; all under “Constants by mode”"
-    return f"{meaning}, {place}" if meaning else place
+    """Return what a constant is; of one that differs from mode to mode, where its values stand."""
+    place = "each under “Constants by mode”" if _differs(one) else ""
+    return "; ".join(filter(None, [meaning, place]))
 
 
 def _meaning(effect: str, parameter: EffectParameter) -> str:

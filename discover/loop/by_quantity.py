@@ -1,16 +1,18 @@
 """Expected error of each quantity: of unseen runs without noise, else how far laws differ."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
-from discover.answer import Discrepancy, ExpectedError, sentences
-from discover.answer.sentences import MUCH
+from discover.answer import Discrepancy, ExpectedError
+from discover.answer.modes_in_words import degrees, span
+from discover.answer.sentences import MEASURED_AT, MUCH
 from discover.loop.fitted_range import by_temperature
 from discover.loop.run_record import RunRecord
+from discover.protocols.kinematics import MODULI
 from discover.words import listed, percent_of
 
 BEYOND = 2.0
@@ -49,44 +51,46 @@ def with_unseen(result: Any) -> Discrepancy | None:
         return None
     found = Discrepancy(**result.discrepancy)
     errors = unseen_errors(result)
-    size, count = _mean(errors), len(errors)
+    size, count = _mean([*errors.values()]), len(errors)
     if not found.size or size is None:
         return found
     # of few runs the size is uncertain, as that of normal misses is
     ends = np.sqrt(count / chi2.ppf((0.975, 0.025), count)) if count > 1 else np.ones(2)
-    held = {r.name: _missed(r, result) for r in _held_inside(result)}
-    left = {fold.run: beyond_noise(fold.error_after, result.noise_floor) for fold in result.folds}
     return replace(
         found,
         size=size,
         ci95=(float(ends[0]) * size, float(ends[1]) * size),
-        by_run={**found.by_run, **left, **held},
+        by_run={**found.by_run, **errors},
         unseen=_UNSEEN,
     )
 
 
-def _which(result: Any, errors: Sequence[float]) -> str:
+def _which(result: Any, own: Mapping[str, float]) -> str:
     """Return that errors are of unseen runs; the two means where some were held out, not all."""
-    held = [] if result.folds else [_missed(record, result) for record in _held_inside(result)]
-    turns = errors[: len(errors) - len(held)]
+    left = {*result.left_out, *(fold.run for fold in result.folds)}
+    turns = [error for name, error in own.items() if name in left]
+    held = [error for name, error in own.items() if name not in left]
     if not held or not turns:
-        return _UNSEEN if errors else ""
+        return _UNSEEN if own else ""
     kinds = ("left out in turn", _mean(turns)), ("held out", _mean(held))
     said = [f"{kind} {percent_of(one)}" for kind, one in kinds if one is not None]
     return f"{_UNSEEN}: {', '.join(said)}"
 
 
-def unseen_errors(result: Any) -> list[float]:
-    """Return errors without noise of runs that were left out in turn, and of those held out.
+def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
+    """Return errors without noise, by name of runs left out in turn, and of those held out.
 
-    Of runs left out in turn only the mean is known, which each has then.
+    `kind`: quantity of `QUANTITIES` that these record; by default all of them.
     """
     if result.folds:
-        return [beyond_noise(fold.error_after, result.noise_floor) for fold in result.folds]
-    fitted = sum(not record.held_out for record in result.records)
-    left = result.left_out_error
-    own = [] if left is None else [float(left)] * fitted
-    return own + [_missed(record, result) for record in _held_inside(result)]
+        found = {
+            fold.run: beyond_noise(fold.error_after, result.noise_floor) for fold in result.folds
+        }
+    else:
+        found = dict(result.left_out)
+        found |= {record.name: _missed(record, result) for record in _held_inside(result)}
+    own = {record.name for record in result.records if not kind or _is(record, kind)}
+    return {name: error for name, error in found.items() if name in own}
 
 
 def _held_inside(result: Any) -> list[RunRecord]:
@@ -115,6 +119,9 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
     for kind in ("N1", "N2", "uniaxial"):
         own = measured(result.records, kind, result.noise_floor)
         if own is not None:
+            unseen = unseen_errors(result, kind)
+            if (inside := _mean([*unseen.values()])) is not None:
+                own = replace(own, inside=inside, note=_which(result, unseen), is_residual=False)
             found[kind] = own
             continue
         apart = differing(result, kind)
@@ -178,8 +185,8 @@ def of_stress(result: Any) -> ExpectedError:
     fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
     held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
     fast = [r for r in held if r.fastest > FASTER * fastest]
-    errors = unseen_errors(result)
-    inside, at = _mean(errors), _measured_at(fast)
+    errors = unseen_errors(result, "sigma12")
+    inside, at = _mean([*errors.values()]), _measured_at(fast)
     beyond = _mean([_missed(r, result) for r in fast])
     spread = result.spread_of_laws.get("sigma12")
     if beyond is None and spread is not None and spread.beyond is not None:
@@ -214,16 +221,16 @@ def _measured_at(fast: Sequence[RunRecord]) -> str:
     told = []
     for at, own in (by_temperature(fast) or {None: fast}).items():
         rates = [record.fastest for record in own]
-        place = "" if at is None else f" at {sentences.degrees(at)}"
-        told += [f"{sentences.span((min(rates), max(rates)))} 1/s{place}"] if rates else []
-    return f"{sentences.MEASURED_AT} {listed(told)}" if told else ""
+        place = "" if at is None else f" at {degrees(at)}"
+        told += [f"{span((min(rates), max(rates)))} 1/s{place}"] if rates else []
+    return f"{MEASURED_AT} {listed(told)}" if told else ""
 
 
 def _is(record: RunRecord, kind: str) -> bool:
     if kind == "uniaxial":
         return record.flow == "uniaxial" and record.quantity == "tensile_stress"
     if kind == "sigma12":
-        return record.flow == "shear" and record.quantity in ("sigma12", "strain")
+        return record.flow == "shear" and record.quantity in ("sigma12", "strain", *MODULI)
     return record.flow == "shear" and record.quantity == kind
 
 

@@ -106,3 +106,9 @@ class ConstantByMode(StageParameter):
     def values(self) -> tuple[float, ...]:
         """Value of each mode."""
         return tuple(mode.value for mode in self.modes)
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """Least and largest value of the modes that the runs determine; None where none is."""
+        told = [mode.value for mode in self.modes if not mode.left_open]
+        return (min(told), max(told)) if told else None

@@ -127,17 +127,18 @@ class Ended(Path):
             return None if size is None else asdict(size)
         if len(missed) < FEWEST_RUNS:
             return asdict(size)
-        assert self.left_out_error is not None
+        mean = float(np.mean(missed))
         ends = np.sqrt(len(missed) / chi2.ppf((0.975, 0.025), len(missed)))
-        low, high = (float(end) * self.left_out_error for end in ends)
-        names = [run.name for run in self.posterior.problem.fitted.runs]
-        by_run = dict(zip(names, map(float, missed), strict=True))
-        return asdict(replace(size, size=self.left_out_error, ci95=(low, high), by_run=by_run))
+        low, high = (float(end) * mean for end in ends)
+        return asdict(replace(size, size=mean, ci95=(low, high), by_run=self.left_out))
 
     @property
-    def left_out_error(self) -> float | None:
-        """Mean relative error of fitted runs left out in turn; None without a hypothesis."""
-        return None if self._left_out is None else float(np.mean(self._left_out))
+    def left_out(self) -> dict[str, float]:
+        """Error besides noise of each fitted run that is left out in turn, by name."""
+        names = [run.name for run in self.posterior.problem.fitted.runs]
+        if self._left_out is None:
+            return {}
+        return dict(zip(names, map(float, self._left_out), strict=True))
 
     @cached_property
     def _left_out(self) -> Float[np.ndarray, " runs"] | None:
@@ -268,12 +269,13 @@ class Ended(Path):
     def noise(self) -> float:
         """Relative noise, mean over the fitted runs.
 
-        Where a residual is left, only what of it changes from sample to sample.
+        Where a residual is left, of a law or of a model of what is no signal, only what of it
+        changes from sample to sample.
         """
         if (known := self.posterior.problem.noise) is not None:
             return known
         sizes = self.fit.noise.sizes
-        if self.verdict == "unexplained":
+        if self.verdict in ("unexplained", "no_signal"):
             left = [r.relative_residual[-1] for r in self.records if not r.held_out]
             told = [len(values) >= FEWEST_FAST for values in left]
             sizes = np.where(told, np.minimum([fast_part(values) for values in left], sizes), sizes)
@@ -366,7 +368,7 @@ def result_of(
         free_form=tuple(ended.curves),
         discrepancy=ended.discrepancy,
         spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
-        left_out_error=ended.left_out_error,
+        left_out=ended.left_out,
         nearest_law=ended.posterior.memory.get("named"),
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,

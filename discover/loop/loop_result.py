@@ -73,8 +73,8 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     first; none where one was declared. `free_form`: free functions of one variable that explain
     what named effects leave, the likeliest first. `discrepancy`: size of what no hypothesis holds,
     as the contract writes it; None where nothing is said. `spread_of_laws`: by how much laws that
-    describe the runs as well differ in σ12, N1, N2, uniaxial stress. `left_out_error`:
-    root-mean-square relative error of fitted runs that are left out of the fit in turn.
+    describe the runs as well differ in σ12, N1, N2, uniaxial stress. `left_out`:
+    relative error besides noise of each fitted run while it is left out of the fit, by name.
     `nearest_law`: where the law has no name of the field: the best that has one. `material`: the
     simple material that the runs show, recognised before any search; None where none is.
     `tolerance`: relative discrepancy that is accepted. `temperature_C`: of the moduli and times;
@@ -104,7 +104,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     free_form: tuple[FreeForm, ...] = ()
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
-    left_out_error: float | None = None
+    left_out: Mapping[str, float] = field(default_factory=dict)
     nearest_law: NearestLaw | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE

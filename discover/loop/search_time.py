@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+from discover.compilation_cache import compiled_share
 from discover.effects.registry import built_in_effects, named_effects
 from discover.forward.declared import may_differ_by_mode
 from discover.progress import Crowding
@@ -13,11 +14,13 @@ from discover.progress import Crowding
 class _Part(NamedTuple):
     """What follows a search: fits of one hypothesis and seconds besides.
 
-    `share`: most of its fits over those of the search.
+    `compiling`: further seconds where all its programs are compiled. `share`: most of its fits over
+    those of the search.
     """
 
     fits: float
     seconds: float = 0.0
+    compiling: float = 0.0
     share: float = 1.0
 
 
@@ -28,14 +31,15 @@ _FIRST, _EXCHANGE = 0.8, 1.4
 """Fit of one effect over one of several, more of them being given up at once; fits of an exchanged
 hypothesis."""
 
-_WEIGHED, _WEIGHED_ALONE = _Part(135.0, share=1.2), _Part(10.0)
+_WEIGHED, _WEIGHED_ALONE = _Part(140.0, share=1.2), _Part(10.0)
 """What is weighed after the search: with runs held out, when all are fitted again, or without."""
 
-_CURVES, _BANDS = _Part(36.0, 3.5, 0.5), _Part(15.0, 8.0, 0.7)
-"""Curves of one variable; bands, intervals and the next test. All these were measured on two cores:
-on LDPE, a polyisoprene melt, a gel, blood, two-mode PTT and noise."""
+_CURVES, _BANDS = _Part(20.0, 0.3, 1.2, 0.5), _Part(15.0, 0.5, 2.5, 0.7)
+"""Curves of one variable; bands, intervals and the next test. All these were measured on two cores,
+with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
+two-mode PTT and noise. Seconds are those of the machine of `slowness`."""
 
-_SECOND = 1.6
+_SECOND = 1.3
 """What is weighed after the second search, with more constants, over that after the first."""
 
 _FEW_NEAR = 0.2
@@ -59,7 +63,7 @@ class SearchTime:
     all of it is done, each time with another run left out. `held_out`: whether runs are held out.
     `curves`: whether curves of one variable are tried. `reported`: whether these, bands and the
     next test belong to it. `clock`: seconds now. `crowding`: how much longer this process takes
-    than alone.
+    than alone. `compiled`: share of programs that have to be compiled.
     """
 
     def __init__(
@@ -72,8 +76,9 @@ class SearchTime:
         reported: bool = True,
         clock: Callable[[], float] = time.perf_counter,
         crowding: Callable[[], float] | None = None,
+        compiled: Callable[[], float] = compiled_share,
     ):
-        self._crowding, self._clock = crowding or Crowding(), clock
+        self._crowding, self._clock, self._compiled = crowding or Crowding(), clock, compiled
         self._most, self._several_modes, self._rounds = most, several_modes, rounds
         self._weighing = _WEIGHED if held_out else _WEIGHED_ALONE
         self._reporting = [_CURVES, _BANDS][not curves :] if reported else []
@@ -119,7 +124,7 @@ class SearchTime:
         if self._follows and self._searches < 2:
             fits += self._first or self._done - self._before + fits
         fits += sum(map(self._of, self._reports))
-        seconds = self._near * sum(part.seconds for part in self._reports)
+        seconds = self._besides(self._reports)
         fits += (self._rounds - 1) * (self._done - self._round_before[0] + fits)
         seconds += (self._rounds - 1) * (self._seconds - self._round_before[1] + seconds)
         passed, crowding = self._clock() - self._begun, self._crowding()
@@ -151,4 +156,8 @@ class SearchTime:
 
     def _pass(self, parts: list[_Part]) -> None:
         self._done += sum(map(self._of, parts))
-        self._seconds += self._near * sum(part.seconds for part in parts)
+        self._seconds += self._besides(parts)
+
+    def _besides(self, parts: list[_Part]) -> float:
+        compiled = self._compiled()
+        return self._near * sum(part.seconds + compiled * part.compiling for part in parts)

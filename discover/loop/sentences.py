@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from discover.answer.sentences import A_TRANSIENT, MUCH, degrees, reduced_to
-from discover.loop.by_quantity import differing, measured
+from discover.answer.modes_in_words import degrees, reduced_to
+from discover.answer.sentences import A_TRANSIENT, MUCH
+from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.parts import Stage
 from discover.loop.run_record import RunRecord
 from discover.words import (
@@ -83,6 +84,8 @@ def what_to_measure_next(result: Any) -> str:
     if result.verdict == "unexplained":
         return _of_the_instrument(result) or _of_another_stress(result) or _by_geometry(result)
     doubtful = _most_doubtful(result.stages)
+    if (doubtful is None or not doubtful.aliases) and (told := _of_predicted_n1(result)):
+        return told
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
     check, title = _as_clause(doubtful.check), effect_title(doubtful.effect)
@@ -112,7 +115,8 @@ def _worst(result: Any) -> str:
     """Return the fitted run that is missed most, by its own size."""
     by_run = (result.discrepancy or {}).get("by_run", {})
     fitted = [record for record in result.records if not record.held_out]
-    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in fitted}
+    sheared = [record for record in fitted if record.flow == "shear"]  # in a gap
+    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in sheared or fitted}
     return max(errors, key=lambda name: errors[name], default="one run")
 
 
@@ -125,23 +129,45 @@ def _of_the_instrument(result: Any) -> str:
 
 
 def _of_another_stress(result: Any) -> str:
-    """Return the stress that laws differ in which fit as well; empty where none is open."""
-    shear = [r for r in result.records if r.flow == "shear" and not r.held_out]
+    """Return the stress that laws differ in which fit as well; empty where none is open.
+
+    And where they miss what was measured by more than tolerance and noise: it then comes first.
+    """
+    missed = with_unseen(result)
+    if missed is not None and missed.size > max(result.tolerance, result.noise_floor):
+        return ""
     for kind, title in _OTHERS.items():
         apart = differing(result, kind)
-        if apart is None or not result.tolerance < apart <= MUCH or not shear:
+        if apart is None or not result.tolerance < apart <= MUCH:
             continue
-        rate = max(record.unshifted.fastest for record in shear)
-        stress = result.spread_of_laws[kind].stress
-        if kind == "N1":
-            in_reach = stress is None or stress >= _LEAST_NORMAL_STRESS
-        else:
-            thick = stress is None or stress >= _LEAST_TENSILE_VISCOSITY * rate
-            in_reach = thick and rate <= _FASTEST_EXTENSION
-        if in_reach and measured(result.records, kind, None) is None:
+        if _is_in_reach(result, kind):
             apart_by = f"equally good laws differ by {percent_of(apart)}"
-            return f"{title} at {_fastest(shear)}: {apart_by}."
+            return f"{title} at {_fastest(_sheared(result))}: {apart_by}."
     return ""
+
+
+def _of_predicted_n1(result: Any) -> str:
+    """Return that N1 tests a law which predicts it; empty where it does not, or no one can."""
+    if not normal_stress_settled(result) or not _is_in_reach(result, "N1"):
+        return ""
+    return f"Measure N1 at {_fastest(_sheared(result))}: the law predicts it, and no run tested it."
+
+
+def _sheared(result: Any) -> list[RunRecord]:
+    return [r for r in result.records if r.flow == "shear" and not r.held_out]
+
+
+def _is_in_reach(result: Any, kind: str) -> bool:
+    """Return whether a stress that nobody measured yet can be, at the fastest fitted rate."""
+    shear = _sheared(result)
+    if not shear or measured(result.records, kind, None) is not None:
+        return False
+    rate = max(record.unshifted.fastest for record in shear)
+    stress = result.spread_of_laws[kind].stress
+    if kind == "N1":
+        return stress is None or stress >= _LEAST_NORMAL_STRESS
+    thick = stress is None or stress >= _LEAST_TENSILE_VISCOSITY * rate
+    return thick and rate <= _FASTEST_EXTENSION
 
 
 _FASTEST_EXTENSION = 30.0

@@ -17,26 +17,28 @@ from markupsafe import Markup, escape
 
 from discover._version import __version__
 from discover.answer import Answer, Constant, Suspect
+from discover.answer.modes_in_words import (
+    FEW_MODES,
+    as_constant,
+    degrees,
+    in_order,
+    linear_part,
+    reduced_to,
+    shifts,
+    shortened,
+)
 from discover.answer.sentences import (
     CLASSICAL,
-    FEW_MODES,
     NOT_SEPARABLE,
     SUSPECTED,
     SYMBOLS,
-    as_constant,
-    degrees,
     error_title,
     expected,
-    in_order,
     is_a_set,
     law,
-    linear_part,
     note,
     quality,
-    reduced_to,
     separable,
-    shifts,
-    shortened,
     worst_run,
 )
 from discover.effects import StateEffect

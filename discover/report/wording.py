@@ -66,7 +66,7 @@ def percent(value: float | None) -> str:
 def percent_range(values: Sequence[float | None] | None) -> str:
     """Return the range of several fractions in brackets, to stand behind their mean.
 
-    Those that are None, where a law diverges, are counted.
+    Those that are None, where a law diverges, are counted. A range without a width is none.
     """
     if values is None or len(values) < 2:
         return ""
@@ -74,8 +74,10 @@ def percent_range(values: Sequence[float | None] | None) -> str:
     lost = f"{len(values) - len(told)} of {len(values)} not predicted"
     if not told:
         return f" ({lost})"
-    text = f"{percent(min(told)).removesuffix(' %')} to {percent(max(told))}"
-    return f" ({text})" if len(told) == len(values) else f" ({text}; {lost})"
+    low, high = percent(min(told)), percent(max(told))
+    text = f"{low.removesuffix(' %')} to {high}" if low != high else ""
+    parts = [text, "" if len(told) == len(values) else lost]
+    return f" ({'; '.join(filter(None, parts))})" if any(parts) else ""
 
 
 def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> float | None:

@@ -74,7 +74,7 @@ class LackOfFit:
         if not np.isfinite(self.misfit):
             return f"Does not describe the fitted runs: {self.reason}."
         if self.verdict == "explained":
-            return f"Fits within noise ({percent_of(self.noise or self.misfit)})."
+            return f"Fits within the noise of {percent_of(self.noise or self.misfit)}."
         return (
             f"Describes the fitted runs to {percent_of(self.misfit)}; the rest is systematic "
             f"(noise: {percent_of(self.noise)})."

@@ -49,7 +49,7 @@ def test_a_library_without_the_law_says_at_first_glance_that_its_terms_are_no_fi
 
 def test_a_law_in_the_library_is_said_to_fit_and_its_term_to_be_determined(right):
     """Negative control of the test above."""
-    assert "Fits within noise" in repr(right)
+    assert "Fits within the noise of" in repr(right)
     table = right.summary()
     assert list(table.columns) == [*COLUMNS, "determined"]
     assert table.loc["sigma.sigma", "determined"].startswith("yes")

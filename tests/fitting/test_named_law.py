@@ -151,7 +151,7 @@ def test_the_command_writes_page_json_and_equation(data, tmp_path):
         "law", "constants", "modes", "solvent_viscosity_Pa_s", "range", "expected_error",
     }  # fmt: skip
     assert written["use"]["constants"]["alpha"]["value"] == pytest.approx(MOBILITY, rel=0.05)
-    assert "Fits within noise" in (out / "report.html").read_text()
+    assert "Fits within the noise of" in (out / "report.html").read_text()
     assert (out / "equations.tex").exists()
     assert (out / "figures" / "runs.svg").exists()
 
@@ -166,7 +166,7 @@ def test_a_fit_has_the_answer_of_the_other_commands(fitted):
     assert use["expected_error"]["N2"] is None
     assert fitted.adequate
     assert fitted.answer.headline.startswith("Giesekus, α = 0.3")
-    assert any("Fits within noise" in note for note in fitted.answer.equation.notes)
+    assert any("Fits within the noise of" in note for note in fitted.answer.equation.notes)
 
 
 def test_a_solvent_that_is_fitted_is_the_whole_one():

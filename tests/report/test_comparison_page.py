@@ -34,7 +34,7 @@ def test_no_wording_fails_over_a_number_that_is_missing(number):
     # numbers that are there: test_wording.py
     assert percent(number) == "–"
     assert percent_range([number, number]) == " (2 of 2 not predicted)"
-    assert percent_range([0.01, number]) == " (1 to 1 %; 1 of 2 not predicted)"
+    assert percent_range([0.01, number]) == " (1 of 2 not predicted)"
     assert interval((number, 1.0)) in ("–", "inf to 1")
     assert significant(number) in ("–", "inf")
     assert estimate(0.2, (number, 1.0)) == "0.2"

@@ -1,0 +1,96 @@
+"""Modes of a law, and the temperature and shift factors of its times, in words."""
+
+import math
+from typing import Any
+
+from discover.words import listed, significant
+
+
+def degrees(temperature: float) -> str:
+    """Return a temperature in °C."""
+    return f"{temperature:.0f} °C".replace("-", "−")
+
+
+def reduced_to(answer: Any) -> str:
+    """Return the temperature to which times and rates of shifted runs were reduced."""
+    at = answer.temperature_C
+    return "the reference temperature" if at is None else degrees(at)
+
+
+def shortened(factor: float) -> str:
+    """Return what a shift factor does to times, in words."""
+    by, way = (1.0 / factor, "shorter") if factor < 1.0 else (factor, "longer")
+    return f"{way} by a factor of {significant(by, 3)}"
+
+
+def shifts(answer: Any) -> list[tuple[float, float]]:
+    """Return temperatures of shifted runs with their factors: of many the first and the last."""
+    found = [*answer.shift_factors.items()]
+    return found if len(found) <= MOST_SHIFTS else [found[0], found[-1]]
+
+
+MOST_SHIFTS = 3
+
+
+def shifted(answer: Any) -> str:
+    """Return at which temperature times hold, and what shortens them; empty where nothing does."""
+    if not answer.shift_factors:
+        return ""
+    said = [
+        f"{shortened(float(factor))} at {degrees(at)} (a_T = {significant(factor, 3)})"
+        for at, factor in shifts(answer)
+    ]
+    return f"Moduli and times are those at {reduced_to(answer)}; times are {', '.join(said)}."
+
+
+def is_plain(answer: Any) -> bool:
+    """Return whether the law has no units: one mode of 1 Pa and 1 s."""
+    return [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
+
+
+def span(ends: tuple[float, float]) -> str:
+    """Return a range in numbers of two digits."""
+    low, high = map(short, ends)
+    # else the power of the one would be taken for that of both
+    dash = " to " if "×" in high and "×" not in low else "–"
+    return low if low == high else f"{low}{dash}{high}"
+
+
+def short(value: float) -> str:
+    """Return a number with two digits."""
+    return significant(value, 2)
+
+
+def linear_part(answer: Any) -> str:
+    """Return moduli, times and solvent of a law: of few modes all, of more from where to where."""
+    found = []
+    modes = in_order(answer)
+    for letter, unit, values in (
+        ("G", "Pa", [mode.modulus_Pa for mode in modes]),
+        ("λ", "s", [mode.relaxation_time_s for mode in modes]),
+    ):
+        if len(values) > FEW_MODES:
+            low, high = (f"{short(end)} {unit}" for end in (min(values), max(values)))
+            found.append(f"{letter} from {low} to {high}")
+        elif values:
+            told = listed([as_constant(answer, one) for one in values])
+            found.append(f"{letter} = {told} {unit}")
+    if answer.solvent_viscosity_Pa_s:
+        found.append(f"η_s = {as_constant(answer, answer.solvent_viscosity_Pa_s)} Pa s")
+    return ", ".join(found)
+
+
+FEW_MODES = 3
+"""Relaxation modes up to which all are listed."""
+
+
+def in_order(answer: Any) -> list[Any]:
+    """Return the modes from the shortest time to the longest."""
+    return sorted(answer.modes, key=lambda mode: mode.relaxation_time_s)
+
+
+def as_constant(answer: Any, value: float) -> str:
+    """Return a modulus, time or viscosity with the digits that it has among the constants."""
+    own = (one for one in answer.constants if math.isclose(one.value, value, rel_tol=1e-6))
+    one = next(own, None)
+    return significant(value, 3 if one is None else one.digits)
