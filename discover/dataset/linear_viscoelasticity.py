@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.linear.mode_search import ModeFit, ModeSearch, relative_moduli
+from discover.dataset.mode_search import ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.noise_model import independent_samples, rms

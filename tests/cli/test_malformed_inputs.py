@@ -39,7 +39,7 @@ def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
     assert wrong is None, (wrong, outcome)
 
 
-HARMED_OTHERWISE = ("package", "options", "estimator", "frame")
+HARMED_OTHERWISE = ("options", "estimator", "frame")
 
 
 @pytest.mark.parametrize(
