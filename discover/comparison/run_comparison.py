@@ -127,7 +127,7 @@ def compare(
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
     several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
-    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out, trainings=1.0)
+    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)

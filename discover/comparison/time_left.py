@@ -22,9 +22,8 @@ _LEAST = 0.15
 class ComparisonTime:
     """Progress of a comparison.
 
-    `most`, `several_modes`, `held_out`: as for `SearchTime`. `trainings`: how often all learners
-    learn. `clock`, `crowding`: as for `SearchTime`. `compiled`: share of programs that have to
-    be compiled.
+    `most`, `several_modes`, `held_out`, `clock`, `crowding`: as for `SearchTime`. `compiled`: share
+    of programs that have to be compiled.
     """
 
     def __init__(
@@ -33,14 +32,13 @@ class ComparisonTime:
         most: int,
         several_modes: bool,
         held_out: bool,
-        trainings: float,
         clock: Callable[[], float] = time.perf_counter,
         crowding: Callable[[], float] | None = None,
         compiled: Callable[[], float] = compiled_share,
     ):
         self._clock, self._crowding = clock, crowding or Crowding()
         self._compiled = compiled
-        self._tell, self._trainings = by_time(progress, clock), trainings
+        self._tell = by_time(progress, clock)
         self._searches = SearchTime(
             most, several_modes, held_out=held_out, reported=False, clock=clock,
             crowding=self._crowding,
@@ -88,8 +86,7 @@ class ComparisonTime:
 
     def _expect(self) -> None:
         crowding = self._crowding()
-        learn, self._weigh = (
+        self._learn, self._weigh = (
             (kept + self._compiled() * compiling) * crowding + share * self._search
             for kept, compiling, share in (_LEARN, _WEIGH)
         )
-        self._learn = learn * self._trainings
