@@ -6,7 +6,7 @@ is solved for has the derivative of the implicit function.
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +18,6 @@ from discover.forward.periodic_states import periodic_state
 from discover.forward.stepping import (
     Observe,
     answer_to_stress,
-    begun,
     follow,
     without_derivatives,
 )
@@ -56,24 +55,11 @@ def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> A
 
 
 def observed_on_grid(
-    fluid: Fluid,
-    protocol: FlowProtocol,
-    grid: IntegrationGrid,
-    adjoint: Any = None,
+    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> Inexact[Array, "n 3"]:
-    """Return what `AtSamples.observed` holds, at the samples of one grid.
-
-    `adjoint`: how diffrax differentiates in reverse mode. None is for values and forward mode: the
-    same steps, traced and compiled in a third of the time.
-    """
+    """Return what `AtSamples.observed` holds, at the samples of one grid."""
     make = partial(dynamics_of_fluid, protocol=protocol)
-    if adjoint is None or protocol.control != "rate":
-        return observed_of_dynamics(make, fluid, fluid, protocol, grid)
-    start = begun(make(fluid), make(without_derivatives(fluid)), protocol, grid)
-    from discover.forward.by_diffrax import followed_in_reverse  # diffrax takes a second to load
-
-    modes = followed_in_reverse(dynamics_of_fluid, fluid, protocol, grid, start, adjoint)
-    return _of_states(fluid, jnp.swapaxes(modes, 1, 2), protocol, grid)
+    return observed_of_dynamics(make, fluid, fluid, protocol, grid)
 
 
 def observed_of_dynamics(

@@ -106,7 +106,7 @@ class Compare(Section):
     """Chooses the number of terms."""
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
     """Most terms of a law."""
-    recipe: Literal["default", "thorough", "paper"] = "default"
+    recipe: Literal["default", "thorough"] = "default"
     """How the network is trained."""
     quick: bool = False
     """Fewer training steps, for a first look."""

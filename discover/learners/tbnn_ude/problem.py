@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -40,29 +39,10 @@ class TrainingProblem(eqx.Module):
         """Return the fluid of a trial law."""
         return Fluid(law, self.modulus, self.relaxation_time, self.solvent_viscosity)
 
-    def predicted(
-        self, law: AbstractConstitutiveLaw, adjoint: Any = None
-    ) -> Float[Array, "runs n"]:
+    def predicted(self, law: AbstractConstitutiveLaw) -> Float[Array, "runs n"]:
         """Return what is recorded of a trial law."""
         fluid = self.fluid(law)
-        return self.flows.over(
-            lambda protocol, grid: observed_on_grid(fluid, protocol, grid, adjoint)[:, 0]
-        )
-
-    def mean_squared_errors(self, law: AbstractConstitutiveLaw) -> Float[Array, " runs"]:
-        """Return the mean squared error of each run, of stresses over the sum of the moduli.
-
-        In reverse mode with recursive checkpoints at half the cost of storing every step and a
-        ninth of the continuous adjoint (51, 94 and 481 ms for the paper's network).
-        """
-        import diffrax  # a second, of which no other recipe has any use
-
-        in_reverse = diffrax.RecursiveCheckpointAdjoint()
-        weight, total = self.records.weight, jnp.sum(self.modulus)
-        unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))
-        scale = jnp.where(weight > 0, weight * unit[:, None], 1.0)
-        errors = self.records.residual(self.predicted(law, in_reverse)) / scale
-        return jnp.sum(errors**2, axis=1) / jnp.sum(weight > 0, axis=1)
+        return self.flows.over(lambda protocol, grid: observed_on_grid(fluid, protocol, grid)[:, 0])
 
 
 def make_problem(
