@@ -43,7 +43,6 @@ def train(
         sparse = TensorSINDy(
             library=library,
             optimizer=options.optimizer,
-            selection=options.selection,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,

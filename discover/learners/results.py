@@ -85,29 +85,18 @@ class TermTables(NotebookView):
     def path_table(self) -> pd.DataFrame:
         """Return the best law of each size, from no term on; empty where the learner has no path.
 
-        Columns: relative misfit on all runs and on runs left out (``held_out``), log evidence, and
-        the rules that choose the law.
+        Columns: relative misfit on all runs and on runs left out (``held_out``), log evidence, by
+        which a law is chosen.
         """
-        lines = []
-        for member in self.details.get("path", ()):
-            by = [rule for rule, terms in self._chosen().items() if set(terms) == _support(member)]
-            lines.append(
-                {
-                    "size": member["size"],
-                    "terms": ", ".join(member["support"]) or "no term",
-                    **{name: member[name] for name in ("misfit", "held_out", "log_evidence")},
-                    "chosen_by": ", ".join(by),
-                }
-            )
+        lines = [
+            {
+                "size": member["size"],
+                "terms": ", ".join(member["support"]) or "no term",
+                **{name: member[name] for name in ("misfit", "held_out", "log_evidence")},
+            }
+            for member in self.details.get("path", ())
+        ]
         return pd.DataFrame(lines)
-
-    def selectors_table(self) -> pd.DataFrame:
-        """Return whether each rule of choice takes each term; empty where there is no path."""
-        chosen = self._chosen()
-        terms = list(dict.fromkeys(term for support in chosen.values() for term in support))
-        lines = {rule: [term in support for term in terms] for rule, support in chosen.items()}
-        table = pd.DataFrame.from_dict(lines, orient="index", columns=terms, dtype=bool)
-        return table.rename_axis("rule")
 
     def inclusion_table(self) -> pd.DataFrame:
         """Return the probability of each term, were the law among those fitted."""
@@ -129,9 +118,6 @@ class TermTables(NotebookView):
             for row in self.details.get("rivals", ())
         ]
         return pd.DataFrame(lines)
-
-    def _chosen(self) -> Mapping[str, Sequence[str]]:
-        return (self.details.get("selectors") or {}).get("chosen") or {}
 
     def _shown(self) -> Iterable[Any]:
         yield f"{self.learner}: {self.message}"
@@ -172,10 +158,6 @@ def _determined(
     if any(term.term not in rival for rival in rivals):
         return "no: a law without it fits as well"
     return "yes, if the law is in the library"
-
-
-def _support(member: Mapping[str, Any]) -> set[str]:
-    return set(member["support"])
 
 
 @dataclass(frozen=True)

@@ -55,8 +55,7 @@ def compare(path, out, seed, overwrite, progress):
         numbers.append(part["x"])
     term = {"term": "sigma.sigma", "coefficient": noise}
     errors = {"f": {"sigma12": noise, "N1": None, "N2": None}}
-    details = {"selectors": {"chosen": {"evidence": ["sigma.sigma"], "held_out": []}}}
-    learner = {"terms": [term], "errors": errors, "details": details}
+    learner = {"terms": [term], "errors": errors, "details": {}}
     content = {"learners": {"tensor_sindy": learner}, "rivals": [], "undetermined": ["N2"]}
     folder.write("comparison.json", json.dumps({**content, "numbers": numbers}))
     folder.write("report.html", "<p>")

@@ -52,7 +52,6 @@ def outcome(learner, number, predicted):
         row["held_out_by_run"] = {"a": 0.01, "b": number, "c": 0.05}
     details = {
         "path": path,
-        "selectors": {"chosen": {"evidence": ["sigma.sigma"], "held_out": None or []}},
         "inclusion": {"sigma.sigma": 0.5},
         "misfit": number,
         "coefficients": {"sigma": {"mean": number, "spread": number}},

@@ -15,7 +15,7 @@ import pytest
 from fewer_hypotheses import few_candidates
 from standing_alone import SCRIPT, stands_alone
 
-from discover.comparison import LearnerOutcome, compare
+from discover.comparison import compare
 from discover.comparison.bands import Band
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
@@ -29,7 +29,7 @@ from discover.report.plots.comparison.selection import (
     third_harmonic,
 )
 from discover.report.plots.style import SPARSE, style_sheet
-from discover.report.wording import percent, selection_sentence
+from discover.report.wording import percent
 from discover.study import RunFolder, parse_study
 
 
@@ -161,19 +161,14 @@ PATH = [
         "log_evidence": 450.0,
     },
 ]
-SELECTORS = {"chosen": {"evidence": ["sigma.sigma"], "held_out": []}, "agree": False}
 
 
-def test_the_selection_path_shows_its_rules_and_their_disagreement():
-    details = {"path": PATH, "selectors": SELECTORS, "inclusion": {"sigma.sigma": 0.9}}
+def test_the_selection_path_shows_the_likeliest_law_and_probable_terms():
+    details = {"path": PATH, "inclusion": {"sigma.sigma": 0.9}}
     drawn = selection_picture(details)
     assert drawn is not None
-    for label in ("chosen by evidence", "chosen by held-out runs", "σ·σ", "runs left out"):
+    for label in ("likeliest", "σ·σ", "runs left out"):
         assert label in drawn.svg
-    outcome = LearnerOutcome("tensor_sindy", (), 1.0, (np.ones(1), np.ones(1)), details)
-    assert (
-        selection_sentence(outcome) == "The rules disagree. evidence: σ·σ; held-out runs: no term."
-    )
     assert selection_picture({"path": PATH[:1]}) is None
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import t as student
 
 from discover.dataset.run import Run
 from discover.effects.library_term import library_term
@@ -18,43 +17,6 @@ from discover.learners.settings import ARITHMETIC, KnownPart
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.progress import require_wanted
 from tensor_library.library import TermLibrary
-
-_LEVEL = 0.01
-
-
-def choose_by_held_out(errors: Float[np.ndarray, "path runs"]) -> int:
-    """Return the simplest member whose error in runs left out is not significantly above the best.
-
-    `errors`: relative misfit in runs that the fit did not see. A paired t-test on their logarithms
-    at 1 %; strict, as the supports were found with all runs in view.
-    """
-    floored = np.log(_floored(errors))
-    best = int(np.argmin(np.mean(floored, axis=1)))
-    count = errors.shape[1]
-    for member in range(best):
-        excess = floored[member] - floored[best]
-        spread = float(np.std(excess, ddof=1)) / np.sqrt(count)
-        if np.mean(excess) <= student.ppf(1.0 - _LEVEL, count - 1) * spread:
-            return member
-    return best
-
-
-def choose_by_one_standard_error(errors: Float[np.ndarray, "path runs"]) -> int:
-    """Return the simplest member within one standard error of the best in runs left out.
-
-    On the mean over runs of the squared error [Breiman et al. 1984, Classification and Regression
-    Trees, ch. 3.4.3]; whole runs are left out, as neighbouring samples are correlated.
-    """
-    squares = _floored(errors) ** 2
-    means = np.mean(squares, axis=1)
-    best = int(np.argmin(means))
-    error = float(np.std(squares[best], ddof=1)) / np.sqrt(errors.shape[1])
-    return int(np.flatnonzero(means <= means[best] + error)[0])
-
-
-def _floored(errors: Float[np.ndarray, "path runs"]) -> Float[np.ndarray, "path runs"]:
-    return np.maximum(np.where(np.isfinite(errors), errors, 1.0), ARITHMETIC)
-
 
 _STEP = 1e-4
 """Of the width of a prior: step of a difference."""

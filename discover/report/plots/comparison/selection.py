@@ -1,4 +1,4 @@
-"""The way from the empty to the dense law, and which member each rule would take."""
+"""The way from the empty to the dense law, losses, and errors over Wi and De."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -30,13 +30,12 @@ from discover.report.wording import percent
 from discover.words import FIGURE_SYMBOLS, readable
 
 _MOST_BARS = 8
-_RULE_STYLES = {"evidence": (SPARSE, "o", "evidence"), "held_out": (NETWORK, "s", "held-out runs")}
 
 
 def selection_picture(details: Mapping[str, Any]) -> Picture | None:
     """Return the selection path: misfits, evidence, and how probable each term is.
 
-    `details`: of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
+    `details`: of the sparse learner's result: ``path``, ``inclusion``.
     """
     path = details.get("path") or []
     if len(path) < 2:
@@ -67,21 +66,11 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
         middle.plot(sizes, np.max(evidence) - evidence, color=BEFORE, marker=".")
         middle.set_yscale("symlog", linthresh=5.0)
         middle.set_ylabel("log odds behind the likeliest")
-        supports = [row["support"] for row in path]
-        chosen = (details.get("selectors") or {}).get("chosen", {})
-        for offset, (rule, (colour, marker, label)) in enumerate(_RULE_STYLES.items()):
-            if rule in chosen and chosen[rule] in supports:
-                place = supports.index(chosen[rule])
-                left.plot(
-                    sizes[place],
-                    _percentage(path[place]["misfit"]),
-                    marker=marker,
-                    markersize=13 - 3 * offset,
-                    fillstyle="none",
-                    linestyle="none",
-                    color=colour,
-                    label=f"chosen by {label}",
-                )
+        likeliest = int(np.argmax(evidence))
+        left.plot(
+            sizes[likeliest], _percentage(path[likeliest]["misfit"]), marker="o", markersize=13,
+            fillstyle="none", linestyle="none", color=SPARSE, label="likeliest",
+        )  # fmt: skip
         for panel in (left, middle):
             panel.set_xlabel("number of terms")
             panel.set_xticks(sizes)
