@@ -450,3 +450,13 @@ def _copies(answer: Answer) -> list[Mapping[str, str]]:
                 reason = str(error)
         found.append({"name": name, "text": text, "reason": reason})
     return [*found, {"name": "JSON", "text": json_text(answer.to_json()), "reason": ""}]
+
+
+def batch_page(studies: Sequence[Any]) -> str:
+    """Return the page over a batch: how each study ended (`discover.batch.status.StudyStatus`)."""
+    return render(
+        "batch.html",
+        studies=studies,
+        failed=[study for study in studies if study.status == "failed"],
+        waiting=sum(study.status == "waiting" for study in studies),
+    )

@@ -38,7 +38,7 @@ def compare(path, out, seed, overwrite, progress):
     folder = RunFolder(out, fingerprint(study, "compare", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "comparison.json"
     if folder.complete and page.is_file() and data.is_file():
-        return TaskResult(page, data, "there", True)
+        return TaskResult(page, data, "found", True)
     noise = study.data.synthetic.noise
     if noise > 1:
         raise RuntimeError("no law fits <b>this</b>")
