@@ -92,8 +92,7 @@ PATH = [
 
 def outcome(**details):
     term = RecoveredTerm("sigma.sigma", 0.2, ci95=(0.19, 0.21))
-    history = (np.zeros(1), np.zeros(1))
-    return LearnerOutcome("tensor_sindy", (term,), 1.0, history, details, "ended")
+    return LearnerOutcome("tensor_sindy", (term,), 1.0, details, "ended")
 
 
 def test_the_path_has_the_best_law_of_each_size_and_probable_terms():

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Real
+from jaxtyping import Float
 
 from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses
 from discover.comparison.simulated import simulated
@@ -30,15 +30,14 @@ Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 class LearnerOutcome(TermTables):
     """Result of a learner with its predictions in every flow of the comparison.
 
-    `loss_history`: iterations and losses, shape (m,). `predictions`: by the key of the flow; None
-    where the law diverges. `physics`: from `PhysicsReport.to_json`; None where not made. `bands`:
-    by key, lowest and highest prediction over the members of an ensemble; None where one diverges.
+    `predictions`: by the key of the flow; None where the law diverges. `physics`: from
+    `PhysicsReport.to_json`; None where not made. `bands`: by key, lowest and highest prediction
+    over the members of an ensemble; None where one diverges.
     """
 
     learner: str  # name of the learner
     terms: tuple[RecoveredTerm, ...]  # the law term by term
     train_seconds: float  # wall-clock time of the fit
-    loss_history: tuple[Real[np.ndarray, " m"], Real[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""  # one sentence on how the fit ended
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
@@ -64,8 +63,8 @@ class LearnerOutcome(TermTables):
     ) -> "LearnerOutcome":  # fmt: skip
         """Return the outcome of a fit, with what the fluid it found does in every flow."""
         return cls(
-            result.learner, result.terms, result.train_seconds, result.loss_history, result.details,
-            result.message, predictions, bands=_bands(result, fluid, flows, predictions),
+            result.learner, result.terms, result.train_seconds, result.details, result.message,
+            predictions, bands=_bands(result, fluid, flows, predictions),
         )  # fmt: skip
 
     def to_state(self) -> dict[str, Any]:
@@ -85,10 +84,8 @@ class LearnerOutcome(TermTables):
         def numbers(values: Any) -> np.ndarray:
             return np.asarray(values, dtype=float)
 
-        iterations, losses = map(numbers, state["loss_history"])
         read = {
             "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
-            "loss_history": (iterations, losses),
             "predictions": arrays(state["predictions"], numbers),
             "bands": arrays(state.get("bands", {}), lambda ends: tuple(numbers(ends))),
         }

@@ -33,10 +33,6 @@ class RecoveredTerm(LawTerm):
         95 % intervals of the inner parameters.
     inner_at_one
         Inner parameters (value, low, high) if the coefficient is one, where it may be.
-    ci95_given_equal_modes
-        Interval of one coefficient for all modes, where `ci95` lets them differ.
-    ci95_given_declared
-        Interval with the declared modulus and relaxation time, where `ci95` lets them change.
     """
 
     coefficient_penalised: float | None = field(default=None, kw_only=True)
@@ -45,8 +41,6 @@ class RecoveredTerm(LawTerm):
     inner_at_one: Mapping[str, tuple[float, float, float]] = field(
         default_factory=dict, kw_only=True
     )
-    ci95_given_equal_modes: Interval | None = field(default=None, kw_only=True)
-    ci95_given_declared: Interval | None = field(default=None, kw_only=True)
 
     @property
     def is_told_from_zero(self) -> bool:

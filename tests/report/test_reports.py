@@ -124,7 +124,7 @@ def test_identifiers_are_unique(page):
 
 
 def test_the_page_has_the_papers_pictures_and_tables(page):
-    names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss")
+    names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah")
     for name in (*names, "pipkin_error", "training"):
         assert f'<figure id="{name}">' in page
     for text in ("penalised", "debiased", "95 % interval", "σ₁₂", "N₂", "not determined"):

@@ -1,4 +1,4 @@
-"""The way from the empty to the dense law, losses, and errors over Wi and De."""
+"""The way from the empty to the dense law, and errors over Wi and De."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,7 +20,6 @@ from discover.report.plots.style import (
     Panel,
     Picture,
     figure,
-    learner_style,
     legend_above,
     make_percentage,
     picture,
@@ -93,30 +92,6 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
 def _percentage(share: float | None) -> float:
     """Return a share in per cent for a logarithmic axis; NaN, a gap, where there is none."""
     return np.nan if share is None else 100.0 * max(share, 1e-9)
-
-
-def loss_picture(comparison: Comparison) -> Picture | None:
-    """Return the loss of each learner against its iterations; None where none has any."""
-    panels = []
-    for name, outcome in comparison.outcomes.items():
-        iterations, losses = outcome.loss_history
-        if not losses.size:
-            continue
-        positive = np.where(np.isfinite(losses), np.maximum(losses, 1e-30), np.nan)
-        sparse = name == "tensor_sindy"
-        settings = {
-            "yscale": "log",
-            "title": learner_title(name),
-            "xlabel": "support refitted" if sparse else "optimiser iteration",
-            "ylabel": "best squared relative misfit" if sparse else "training loss",
-        }
-        style = {"color": learner_style(name)["color"]}
-        panels.append(Panel([(iterations, positive, style)], settings))
-    caption = (
-        "Loss while learning. The sparse learner's is the best misfit so far over the supports "
-        "it refitted; the two scales are not comparable."
-    )
-    return row_of_panels("loss", caption, panels, 9.0, 2.6) if panels else None
 
 
 def third_harmonic(stress: np.ndarray) -> float:
