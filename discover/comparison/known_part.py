@@ -197,8 +197,7 @@ def without_instrument(
     """
     require_possible(effects, data.dataset.runs)
     other = next((run for run in data.dataset if run.protocol.control != "rate"), None)
-    # an instrument is the same, whatever the loading
-    runs = [replace(run, loading=None) for run in data.dataset if run.flow == "shear"]
+    runs = [run for run in data.dataset if run.flow == "shear"]
     if not effects or not runs:
         return data, {}
     if other is not None:

@@ -172,7 +172,7 @@ class AugmentedModel:
         batch: Batch,
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials runs n 3"]:
-        """Return the predicted records, N1 = σ11 − σ22 and N2 = σ22 − σ33 in Pa, as in `OBSERVED`.
+        """Return the predicted records, N1 = σ11 − σ22 and N2 = σ22 − σ33 in Pa.
 
         All come from one integration. N1 and N2 are NaN where a test has none, as a sweep.
         """

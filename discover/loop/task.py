@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discover.dataset import Dataset, Run
-from discover.dataset.records.repeats import with_loadings
+from discover.dataset.records.repeats import require_loadings
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -90,7 +90,7 @@ class Task:
             raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
         fitted, held, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
         for some in (fitted, held):
-            with_loadings(some, loading, noise)  # for what it refuses
+            require_loadings(some, loading)
         declared, every, _ = with_places(declared, [*fitted, *held], [])
         fitted, held = every[: len(fitted)], every[len(fitted) :]
         require_samples(fitted, declared)

@@ -11,7 +11,7 @@ from discover.effects import AbstractEffect, EffectParameter, make_effect
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.forward.declared import LARGEST
-from discover.forward.records import data_scales
+from discover.forward.scales import data_scales
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import TORQUE, Rows, transducer_of
 from discover.inference.engine.variables import SLIP_CURVE

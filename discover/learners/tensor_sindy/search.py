@@ -43,7 +43,6 @@ def library_problem(
                 "more. Leave out one of the two."
             )
         observed += [run.observing(quantity) for run in runs for quantity in run.beside]
-    loadings = [run.loading.deviation for run in runs if run.loading is not None]
     declared = DeclaredModel(
         fluid.law,
         np.asarray(fluid.modulus),
@@ -55,7 +54,6 @@ def library_problem(
         declared,
         [library_term(term) for term in library.terms],
         observed,
-        loading=max(loadings, default=0.0),
         computed=True,
     )
 
