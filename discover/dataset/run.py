@@ -72,9 +72,8 @@ class Run(NotebookView):
         Steps of the rate between two samples whose instants are fitted, or were.
     clock_factor
         Time on the instrument's clock is ``time / clock_factor``: not one for shifted data.
-    rate_is_measured, rate_error
-        Whether the rate was measured, or derived from strain, and not commanded; its relative
-        standard error where it is the mean of rates read with noise.
+    rate_is_measured
+        Whether the rate was measured, or derived from strain, and not commanded.
     rate_before, strain_before
         Rate in 1/s of the steady flow before t = 0, or zero; strain, added up without its sign,
         that the sample had seen in earlier runs.
@@ -105,7 +104,6 @@ class Run(NotebookView):
     storage_modulus: Float[np.ndarray, " _"] | None = None
     loss_modulus: Float[np.ndarray, " _"] | None = None
     rate_steps: tuple[RateStep, ...] = ()
-    rate_error: float = 0.0
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

@@ -54,12 +54,7 @@ def smoothed(run: Run) -> Run:
     scatter = rates - smooth
     if rms(scatter) < _LEAST * rms(rates) or separate_probability([scatter]) < _SEEMS_NOISE:
         return run
-    return replace(
-        run,
-        protocol=sampled_rate(times, smooth),
-        rate=curves(run.time) @ found,
-        rate_error=rms(scatter) / rms(smooth) / float(np.sqrt(len(times))),
-    )
+    return replace(run, protocol=sampled_rate(times, smooth), rate=curves(run.time) @ found)
 
 
 def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:

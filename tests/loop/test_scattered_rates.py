@@ -68,19 +68,6 @@ def test_the_rate_in_the_midst_is_nearer_than_the_samples():
         assert after < 0.3 * before
 
 
-def test_standard_error_of_the_rate_in_the_midst_is_what_it_is_off_by():
-    off = []
-    for seed in range(60):
-        lot = np.random.default_rng([seed, 7])
-        rates = 2.0 * (1.0 + 0.03 * lot.standard_normal(80))
-        found = smoothed(Run("a.csv", TIMES, sampled_rate(TIMES, rates), rates, np.ones(80)))
-        if found.rate_error > 0.0:  # noise seems none once in a hundred draws
-            off.append((found.rate[0] / 2.0 - 1.0) / found.rate_error)
-    assert len(off) > 50
-    # of 60 draws of unit variance, in three standard deviations
-    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=3.0 / np.sqrt(2 * 60))
-
-
 def test_a_rate_that_was_commanded_or_hardly_scatters_stays_as_it_is():
     run = runs_of(0.0, False, 0)[0]
     told = Run(run.name, TIMES, commanded(0.5), run.rate, run.stress)
