@@ -3,8 +3,7 @@
 import pytest
 
 from discover.batch.run import _DRAWING
-from discover.comparison.time_left import ComparisonTime
-from discover.loop.search_time import SearchTime
+from discover.loop.search_time import ComparisonTime, SearchTime
 from discover.progress import (
     Crowding,
     FollowedBy,

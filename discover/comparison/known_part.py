@@ -14,8 +14,7 @@ from discover.comparison.flows import (
     comparison_flows,
     with_each_run,
 )
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.simulated import simulated
+from discover.comparison.outcome import LearnerOutcome, simulated
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect, StateEffect
 from discover.errors import InputError

@@ -18,9 +18,8 @@ from jaxtyping import Array, Bool, Float
 from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics
+from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics, with_cheap_tangents
 from discover.forward.of_fluids import pieces_in_time
-from discover.forward.tangents import with_cheap_tangents
 from discover.identify.exact_series import compare_series
 from discover.identify.relations import (
     Direction,

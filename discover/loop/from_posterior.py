@@ -33,11 +33,11 @@ from discover.loop.final_model import (
     states_of,
 )
 from discover.loop.loop_result import LoopResult
+from discover.loop.measured_rates import instants_found
 from discover.loop.parts import CandidateScore, LawFit, Stage
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
-from discover.loop.step_instants import instants_found
 from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
 from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of

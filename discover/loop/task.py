@@ -25,12 +25,11 @@ from discover.inference.engine.fits import Fitter
 from discover.inference.engine.search import Search
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
+from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
 from discover.loop.run_record import errors_of
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
-from discover.loop.scattered_rates import smoothed, unfelt_scatter
-from discover.loop.step_instants import with_places
 from discover.words import unknown_name
 
 Say = Callable[[str], None]

@@ -10,7 +10,7 @@ from discover.effects import simplest_terms
 from discover.forward import DeclaredModel
 from discover.laws.registry import make_law
 from discover.loop import scattered_rates
-from discover.loop.scattered_rates import smoothed, unfelt_scatter
+from discover.loop.measured_rates import smoothed, unfelt_scatter
 from discover.protocols import sampled_rate
 from discover.protocols import start_up as commanded
 
