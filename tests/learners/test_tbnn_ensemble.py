@@ -66,10 +66,6 @@ def test_members_that_fit_disagree_where_shear_stress_does_not_decide(problem, o
     low, high = predicted.band("N1")
     # the truth acts on the stress; a law on the rate tensor has another N1 for the same σ12
     assert np.linalg.norm(high - low) > 0.02 * np.linalg.norm(high)
-    spread = ensemble.coefficient_spread(
-        [m.law for m in others], sample_states(others[0].law, problem)
-    )
-    assert {name for name, value in spread.items() if value > 0.0} == {"sigma", "gammadot"}
 
 
 @pytest.fixture(scope="module")

@@ -180,7 +180,6 @@ class TBNNUDE(RunPrediction):
                 "n_constants": _count_of_numbers(best.law, best.varies),
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
-                "coefficient_spread_of_members": ensemble.coefficient_spread(members, cloud),
                 "members": [
                     {
                         "misfit": float(misfit),

@@ -11,7 +11,6 @@ from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import observed_on_grid
 from discover.forward.of_fluids import pieces_in_time
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, UpperConvectedMaxwell
 from discover.programs import on_device
@@ -80,11 +79,6 @@ class TrainingProblem(eqx.Module):
     def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
         """Return the fluid of a trial law."""
         return Fluid(law, self.modulus, self.relaxation_time, self.solvent_viscosity)
-
-    def predicted(self, law: AbstractConstitutiveLaw) -> Float[Array, "runs n"]:
-        """Return what is recorded of a trial law."""
-        fluid = self.fluid(law)
-        return self.flows.over(lambda protocol, grid: observed_on_grid(fluid, protocol, grid)[:, 0])
 
 
 def make_problem(
