@@ -37,7 +37,7 @@ def shrunk(layer):
 
 
 def predicted_by(law, problem):
-    """Return what is recorded of a law in the runs of a problem, without the variational equation."""
+    """Return what is recorded of a law in the runs, without the variational equation."""
     fluid = problem.fluid(law)
     return problem.flows.over(lambda *flow: observed_on_grid(fluid, *flow)[:, 0])
 
