@@ -223,7 +223,6 @@ def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
         free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],
         solvent_viscosity=declared.solvent_viscosity,
         linear_error=declared.linear_error,
-        linear_pattern=declared.linear_pattern,
         modulus_covariance=declared.modulus_covariance,
         effects=declared.effects,
         step_instants=declared.step_instants,
