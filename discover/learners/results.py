@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float, Num
 
 from discover.dataset.run import Run
 from discover.equations import Equation, HasEquation, combined, law_parts
@@ -168,8 +167,6 @@ class LearnerResult(HasEquation, TermTables):
         The law, or its projection on a library.
     train_seconds
         Wall-clock time of `fit`.
-    loss_history
-        Iterations and losses, both of shape (m,).
     details
         What else this learner can say; JSON-able.
     message
@@ -182,9 +179,6 @@ class LearnerResult(HasEquation, TermTables):
     law: AbstractConstitutiveLaw
     terms: tuple[RecoveredTerm, ...]
     train_seconds: float = 0.0
-    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]] = field(
-        default_factory=lambda: (np.zeros(0), np.zeros(0))
-    )
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()

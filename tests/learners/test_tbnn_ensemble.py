@@ -35,7 +35,7 @@ def first(problem):
     scale = invariant_sizes(sample_states(law, problem))
     law = initial_law(jax.random.key(0), RECIPE.width, True, scale)
     law = eqx.tree_at(lambda tree: tree.network_mask, law, jnp.zeros(8).at[RATE].set(1.0))
-    return Trained(law, law, np.zeros(1), 1.0, True, "", (RATE,), (STRESS, 0))
+    return Trained(law, law, 1.0, True, "", (RATE,), (STRESS, 0))
 
 
 @pytest.fixture(scope="module")

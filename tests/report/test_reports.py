@@ -35,14 +35,11 @@ from discover.study import RunFolder, parse_study
 
 def trained(learner, study, model, runs, seed=0, progress=None):
     law = make_law("giesekus", {"alpha": 0.2})
-    history = (np.arange(1, 3), np.array([1.0, 0.1]))
     known = {"coefficient_penalised": 0.19, "latex": r"\sigma\cdot\sigma"}
     term = RecoveredTerm("sigma.sigma", 0.2, ci95=(0.199, 0.201), **known)
     message = "ended <b>well</b>"
     details = {"bad": float("nan")}
-    return LearnerResult(
-        learner, law, (term,), 1.0, history, details, message
-    ), Fluid.dimensionless(law)
+    return LearnerResult(learner, law, (term,), 1.0, details, message), Fluid.dimensionless(law)
 
 
 @pytest.fixture(scope="module")

@@ -166,13 +166,11 @@ class TBNNUDE(RunPrediction):
         library = self.projection_library or default_library()
         projection = project(best.law, cloud, library)
         self.terms_ = _terms(projection, best, cloud)
-        losses = np.asarray(best.misfits)
         self.result_ = LearnerResult(
             learner="tbnn_ude",
             law=self.law_,
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
-            loss_history=(np.arange(1, losses.size + 1), losses),
             details={
                 "misfit": best.misfit,
                 "coefficients": _coefficient_table(best.law, cloud),

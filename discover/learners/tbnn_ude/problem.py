@@ -150,7 +150,6 @@ class Trained:
 
     law: TensorBasisNetwork  # after the polish without prior
     penalised_law: TensorBasisNetwork  # as the prior left it
-    misfits: Float[np.ndarray, " m"]  # norm of all residuals after each step
     misfit: float  # relative misfit to the data at the end
     varies: bool  # whether the network part was needed
     message: str  # how the training ended

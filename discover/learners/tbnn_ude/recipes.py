@@ -137,7 +137,7 @@ def _finish(
     settled = session.settled(law)
     end = "the residual is noise or nothing" if settled else "the residual still has structure"
     return Trained(
-        law, penalised, np.asarray(session.misfits), misfit, varies,
+        law, penalised, misfit, varies,
         f"{what}; relative misfit {misfit:.2g}; {end}", tuple(session.taken) if varies else (),
         tuple(session.passed_over),
     )  # fmt: skip

@@ -151,21 +151,20 @@ class TensorSINDy(RunPrediction):
         self.fluid_ = Fluid(
             self.law_, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity
         )
-        misfits, rows = np.array(search.history), len(problem.fitted)
         misfit, covariance = fitter.misfit(chosen), self.covariance_
+        rows = len(problem.fitted)
         self.result_ = LearnerResult(
             learner="tensor_sindy",
             law=self.law_,
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
-            loss_history=(np.arange(1.0, misfits.size + 1.0), np.minimum.accumulate(misfits**2)),
             details={
                 "path": report.path_table(search, path, held_out),
                 "chosen": number,
                 "inclusion": report.inclusion(search),
                 "rivals": report.rival_table(search, chosen),
                 "covariance": None if covariance is None else covariance.tolist(),
-                "iterations": len(misfits),
+                "iterations": search.count,
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,

@@ -151,7 +151,7 @@ class SupportSearch(Search):
         super().__init__(fitter, min(most, len(library)), say)
         self.library, self.optimizer = library, optimizer
         self.places = {name: i for i, name in enumerate(library.names)}
-        self.history: list[float] = []
+        self.count = 0  # laws that were fitted and could be integrated
         self._models: dict[Key, LinearModel] = {}
 
     def support(self, fit: Fit) -> tuple[int, ...]:
@@ -185,7 +185,7 @@ class SupportSearch(Search):
         """Fit hypotheses side by side and keep them; of one set the likeliest."""
         require_wanted()
         fits = super().add(starts, wanted)
-        self.history += [self.fitter.misfit(fit) for fit in fits if np.isfinite(fit.log_posterior)]
+        self.count += sum(bool(np.isfinite(fit.log_posterior)) for fit in fits)
         return fits
 
     def run(self) -> "SupportSearch":
