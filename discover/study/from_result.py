@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from discover.effects import KnownEffect, known_effects, make_effect
+from discover.effects import KnownEffect, known_effects
 from discover.equations import Equation
 from discover.equations.files import COMPARISON, LOOP, read_json
 from discover.equations.formats.json_format import equation_from_json
@@ -132,11 +132,6 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
     left = content.get("lack_of_fit")
     of_sparse = left.get(_SPARSE) if isinstance(left, dict) else None
     verdict = of_sparse.get("verdict") if isinstance(of_sparse, dict) else None
-    by_mode = content.get("by_mode")
-    by_mode = by_mode if isinstance(by_mode, dict) else {}
-    told = by_mode.get("verdict") == "explained" and by_mode.get("known_part") is not None
-    if verdict != "explained" and told:
-        return _of_law_by_mode(by_mode, sparse.get("effects", ()), file)
     equation = equation_from_json(sparse["law"], f"{file.name}: learners.{_SPARSE}.law")
     effects, _ = _effects(sparse.get("effects", ()), file, len(equation.modulus))
     # without a term the known part is the law, and may be more than Maxwell's
@@ -151,20 +146,6 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
     of_terms = {("", term.term): term.ci95 for term in equation.terms if term.ci95 is not None}
     intervals = of_terms | _intervals(sparse.get("effects", ()), file)
     return EarlierResult(file, equation, effects, (), text, intervals, doubt)
-
-
-def _of_law_by_mode(law: Mapping[str, Any], instrument: Any, file: Path) -> EarlierResult:
-    """Return the law with constants by mode of a comparison, which explained what no other did."""
-    equation = equation_from_json(law["known_part"], f"{file.name}: by_mode.known_part")
-    with _damage(file):
-        constants = [*law["constants"].items()]
-    added = [
-        {"effect": name, "parameters": {make_effect(name).parameters[0].name: constant}}
-        for name, constant in constants
-    ]
-    effects, of_modes = _effects([*instrument, *added], file, len(equation.modulus))
-    text = _text(file, "the law with constants by mode", equation, effects, of_modes)
-    return EarlierResult(file, equation, effects, of_modes, text, _intervals(instrument, file), "")
 
 
 def _effects(
