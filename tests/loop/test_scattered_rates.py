@@ -9,7 +9,7 @@ from discover.dataset import Run
 from discover.effects import simplest_terms
 from discover.forward import DeclaredModel
 from discover.laws.registry import make_law
-from discover.loop import scattered_rates
+from discover.loop import measured_rates
 from discover.loop.measured_rates import smoothed, unfelt_scatter
 from discover.protocols import sampled_rate
 from discover.protocols import start_up as commanded
@@ -54,7 +54,7 @@ def test_noise_of_the_reading_is_told_from_that_of_the_motor(seed, some, monkeyp
     if some:
         terms = [term for term in simplest_terms() if term.name in FEW]
         assert len(terms) == len(FEW)
-        monkeypatch.setattr(scattered_rates, "simplest_terms", lambda: terms)
+        monkeypatch.setattr(measured_rates, "simplest_terms", lambda: terms)
     said = unfelt_scatter(DECLARED, runs_of(0.03, False, seed))
     assert "scatter by 3" in said or "scatter by 2" in said
     assert unfelt_scatter(DECLARED, runs_of(0.03, True, seed)) == ""
