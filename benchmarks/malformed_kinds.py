@@ -222,18 +222,6 @@ def frame(root: Path, source: random.Random) -> Case:
     return Case(lambda: dc.from_dataframe(table, None, **options))
 
 
-def package(root: Path, source: random.Random) -> Case:
-    """Give a package that is not the known one."""
-    names = ("reptate/data/PI_LINEAR/PI_94.9k_T-35.tts", "LICENSE", "../../up")
-    raw = bytearray(_packed({name: source.randbytes(50) for name in names}))
-    for _ in range(source.randint(0, 8)):
-        raw[source.randrange(len(raw))] = source.randrange(256)
-    (root / "package.whl").write_bytes(bytes(raw))
-    call = ["data", "fetch", "polyisoprene", "--accept-licence", "--from"]
-    call += [str(root / "package.whl"), "--out", str(root / "data")]
-    return Case(call, ("package", ".tts", "LICENSE"))
-
-
 def options(root: Path, source: random.Random) -> Case:
     """Give wrong words on the command line."""
     write_files(root, {**FOLDER, **EXPORTS, "study.toml": to_toml(STUDY)})
@@ -250,7 +238,6 @@ def options(root: Path, source: random.Random) -> Case:
         ["data", "import", trios, *out, "--encoding", "utf-8"],
         ["data", "import", trios, *out, "--start-time", "0"],
         ["data", "import", trios, *out, "--geometry", "cone_plate:radius_mm=25,angle_deg=1"],
-        ["data", "fetch", "polyisoprene"],
     )))  # fmt: skip
     i = source.randrange(1, len(right))
     key, equals, _ = right[i].partition("=")
@@ -263,5 +250,5 @@ KINDS: dict[str, Callable[[Path, random.Random], Case]] = {
 } | {
     one.__name__.replace("_", " "): one
     for one in (nonsense_in_a_folder, nonsense_in_a_study, resumed, workbook, estimator, frame,
-                package, options)
+                options)
 }  # fmt: skip

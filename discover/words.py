@@ -3,7 +3,7 @@
 import difflib
 import math
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 
 _LONGEST = 80
@@ -164,10 +164,9 @@ def effect_title(name: str) -> str:
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
-def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
-    """Return a set of effects as readers know it, and whether an instrument error goes with it."""
-    title = " + ".join(map(effect_title, names)) or "your model alone"
-    return f"{title}, with a small instrument error" if bench else title
+def effects_title(names: Sequence[str]) -> str:
+    """Return a set of effects as readers know it."""
+    return " + ".join(map(effect_title, names)) or "your model alone"
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:

@@ -18,6 +18,7 @@
 # --out results`.
 
 # %%
+import json
 import tempfile
 from pathlib import Path
 
@@ -65,7 +66,7 @@ try:
     dc.batch.run_batch(studies, out, progress=stop_after_two)
 except KeyboardInterrupt:
     print("stopped")
-pd.read_csv(out / "table.csv")[["study", "outcome", "reason"]]
+pd.read_csv(out / "table.csv")[["study", "outcome", "text"]]
 
 # %% [markdown]
 # The page and the table are kept up to date while studies run. The failed study says what to fix,
@@ -87,24 +88,34 @@ for study in result.studies:
 # ## The table
 #
 # One line for each study. `result.index` is a page that sorts by any column; `table.csv` can be read
-# without this software. Studies that compare two learners fill further columns: the terms of each,
-# its errors, which law every rule chose, rivals, and what is not determined.
+# without this software.
 
 # %%
 result
 
 # %%
 table = pd.read_csv(out / "table.csv")
-table.loc[table["outcome"] == "failed", ["study", "reason"]]
+table.loc[table["outcome"] == "failed", ["study", "text"]]
 
 # %% [markdown]
-# From here on it is pandas. With more noise, the remaining error on the held-out runs is the noise
+# From here on it is JSON and pandas. With more noise, the remaining error on the held-out runs is the noise
 # itself. What the loop adds to the declared Maxwell fluid is visible as long as the error before it
 # is above the error after it.
 
 # %%
-done = table[table["outcome"] == "result"].set_index("study")
-done[["effects", "verdict", "error_before", "error_after"]]
+found = {path.parent.name: json.loads(path.read_text()) for path in out.glob("*/loop.json")}
+done = pd.DataFrame(
+    {
+        name: {
+            "effects": ", ".join(stage["effect"] for stage in loop["stages"]),
+            "verdict": loop["verdict"],
+            "error_before": loop["error_before"]["held_out"],
+            "error_after": loop["error_after"]["held_out"],
+        }
+        for name, loop in sorted(found.items())
+    }
+).T
+done
 
 # %%
 axis = done[["error_before", "error_after"]].plot.bar(figsize=(6, 3), rot=0)

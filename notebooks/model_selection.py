@@ -14,8 +14,8 @@
 # # Which law to believe
 #
 # A library holds many laws, and several fit. This notebook follows the choice: the best law of
-# every size, four rules for choosing among them, the laws that the data cannot rule out, what noise
-# does to all that, and what no rule can decide.
+# every size, the laws that the data cannot rule out, what noise
+# does to all that, and what no evidence can decide.
 #
 # The data are σ12 in four oscillatory flows of a linear Phan-Thien–Tanner fluid, ε = 0.2, whose
 # term is tr(σ)σ, with 5 % noise. Eleven terms may be chosen.
@@ -65,19 +65,6 @@ axes[1].set(xlabel="probability of the term", xlim=(0, 1))
 plt.show()
 
 # %% [markdown]
-# ## Four rules
-#
-# `evidence` asks how probable the data are under a law, all its constants considered, `held_out`
-# how well it predicts other runs, `one_standard_error` for the simplest that predicts them nearly as
-# well. `pysindy` is the sparse optimiser on its own, at its default threshold. If they agree, the choice does not depend on the
-# rule. If they do not, trust none of them alone, and find out why they differ. Here `held_out`
-# keeps the empty law, which is four times as far off: it adds terms only if a t-test over the runs
-# supports them, and with four runs in different flows that test has next to no power.
-
-# %%
-model.result_.selectors_table()
-
-# %% [markdown]
 # ## The law
 #
 # The notebook displays the law. `.table()` gives it as a DataFrame, `.sympy()` for further algebra
@@ -120,7 +107,6 @@ for noise in (0.01, 0.05, 0.2, 0.5):
             "law": " + ".join(found["term"]),
             "coefficients": ", ".join(f"{value:.3f}" for value in found["coefficient"]),
             "95 % half-widths": ", ".join(f"{h:.3f}" for h in (found["high"] - found["low"]) / 2),
-            "rules agree": noisy.result_.details["selectors"]["agree"],
             "rivals": len(laws),
             "the true law": "chosen"
             if list(found["term"]) == ["tr(sigma)*sigma"]
@@ -132,7 +118,7 @@ pd.DataFrame(lines)
 # %% [markdown]
 # ## Not determined by these data
 #
-# No rule and no amount of data helps where two laws give the same σ12 in these flows. This can be
+# No evidence and no amount of data helps where two laws give the same σ12 in these flows. This can be
 # known before anything is measured: which combinations of terms no measurement sees, and whether
 # they change the normal stresses.
 
@@ -144,7 +130,7 @@ structure
 structure.laws[-1]
 
 # %% [markdown]
-# Among laws that differ in σ12 the choice depends on the noise; the rules above settle it
-# or say that they cannot. The choice along an unseen combination is a matter of what was measured:
+# Among laws that differ in σ12 the choice depends on the noise; the evidence settles it
+# or says that it cannot. The choice along an unseen combination is a matter of what was measured:
 # more σ12 will never settle it; one run with N2 may. The notebook `identifiability` goes on from
 # here.

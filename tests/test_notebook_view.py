@@ -88,28 +88,22 @@ PATH = [
     {"size": 0, "support": [], "misfit": 0.3, "held_out": 0.4, "log_evidence": -10.0},
     {"size": 1, "support": ["sigma.sigma"], "misfit": 0.02, "held_out": None, "log_evidence": 90.0},
 ]
-CHOSEN = {"evidence": ["sigma.sigma"], "held_out": []}
 
 
 def outcome(**details):
     term = RecoveredTerm("sigma.sigma", 0.2, ci95=(0.19, 0.21))
-    history = (np.zeros(1), np.zeros(1))
-    return LearnerOutcome("tensor_sindy", (term,), 1.0, history, details, "ended")
+    return LearnerOutcome("tensor_sindy", (term,), 1.0, details, "ended")
 
 
-def test_the_path_says_which_rule_chooses_what():
-    table = outcome(path=PATH, selectors={"chosen": CHOSEN}).path_table()
+def test_the_path_has_the_best_law_of_each_size_and_probable_terms():
+    table = outcome(path=PATH).path_table()
     assert table["terms"].tolist() == ["no term", "sigma.sigma"]
-    assert table["chosen_by"].tolist() == ["held_out", "evidence"]
-    rules = outcome(selectors={"chosen": CHOSEN}).selectors_table()
-    assert rules.loc["evidence", "sigma.sigma"]
-    assert not rules.loc["held_out", "sigma.sigma"]
     likely = outcome(inclusion={"sigma.sigma": 0.9})
     assert likely.inclusion_table()["probability"].tolist() == [0.9]
 
 
 def test_a_learner_without_a_path_has_empty_tables():
     without = outcome()
-    for table in (without.path_table(), without.selectors_table(), without.inclusion_table()):
+    for table in (without.path_table(), without.inclusion_table()):
         assert table.empty
     assert "sigma.sigma" in without._repr_html_()

@@ -3,8 +3,7 @@
 import pytest
 
 from discover.batch.run import _DRAWING
-from discover.comparison.time_left import ComparisonTime
-from discover.loop.search_time import SearchTime
+from discover.loop.search_time import ComparisonTime, SearchTime
 from discover.progress import (
     Crowding,
     FollowedBy,
@@ -174,7 +173,7 @@ def test_the_time_left_of_a_comparison_is_right_whether_it_compiles_or_not(compi
         lambda: SLOW * crowding,
     )
     times = ComparisonTime(
-        whole, 3, False, False, 1.0, clock, lambda: SLOW * crowding, lambda: compiled
+        whole, 3, False, False, clock, lambda: SLOW * crowding, lambda: compiled
     )
     end = crowding * DEMO[compiled][-1][0]
     for at, what, *said in DEMO[compiled][:-1]:

@@ -1,7 +1,7 @@
-"""How the studies of a batch stand and ended, and what each found."""
+"""How the studies of a batch stand and ended."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -11,109 +11,10 @@ from typing import Any
 
 import pandas as pd
 
-from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
-from discover.plain_numbers import parse_json
 from discover.progress import Progress
 from discover.study.atomic import write_text
 from discover.summary_view import NotebookView
-from tensor_library.law_terms import spell
-
-QUANTITIES = ("sigma12", "N1", "N2")
-
-
-@dataclass(frozen=True)
-class LearnerRow:
-    """What one learner found in one study: terms with coefficient and inner parameters."""
-
-    terms: tuple[tuple[str, float, Mapping[str, float]], ...]
-    errors: Mapping[str, float]  # largest relative error of each quantity in flows that no fit saw
-
-    @property
-    def text(self) -> str:
-        """The terms as plain text."""
-        parts = {}
-        for term, value, inner in self.terms:
-            values = ", ".join(f"{name} = {number:.4g}" for name, number in inner.items())
-            parts[f"{term} [{values}]" if values else term] = value
-        return spell(parts) if parts else "no term"
-
-
-@dataclass(frozen=True)
-class StudyRow:
-    """One study as the tables of a batch show it; everything empty where it failed."""
-
-    learners: Mapping[str, LearnerRow] = field(default_factory=dict)  # by name
-    rivals: int | None = None  # number of laws that its data do not tell from the one found
-    undetermined: tuple[str, ...] = ()  # quantities that they do not decide
-    effects: tuple[str, ...] = ()  # effects that a closed loop added
-    verdict: str = ""  # of the closed loop, or of the comparison
-    # on its held-out runs, or on the fitted ones where none were held out
-    error_before: float | None = None
-    error_after: float | None = None
-
-
-def read_row(folder: Path) -> StudyRow:
-    """Return the row of a folder of results; an empty one where they are missing or damaged."""
-    try:
-        for name, reader in (("comparison.json", _comparison), ("loop.json", _loop)):
-            if (folder / name).is_file():
-                return reader(parse_json(read_bytes(folder / name, name)))
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        pass  # a table over thousands of studies does not fall over one of them
-    return StudyRow()
-
-
-def _comparison(content: Mapping[str, Any]) -> StudyRow:
-    learners = {
-        str(name): LearnerRow(tuple(map(_term, learner["terms"])), _worst(learner["errors"]))
-        for name, learner in content["learners"].items()
-    }
-    undetermined, verdict = tuple(map(str, content["undetermined"])), content.get("verdict", "")
-    return StudyRow(learners, len(content["rivals"]), undetermined, verdict=str(verdict))
-
-
-def _term(content: Mapping[str, Any]) -> tuple[str, float, dict[str, float]]:
-    inner = {str(name): float(value) for name, value in content.get("inner", {}).items()}
-    return str(content["term"]), float(content["coefficient"]), inner
-
-
-def _worst(errors: Mapping[str, Mapping[str, float | None]]) -> dict[str, float]:
-    worst = {}
-    for quantity in QUANTITIES:
-        values = [v for row in errors.values() if (v := row.get(quantity)) is not None]
-        if values:
-            worst[quantity] = float(max(values))
-    return worst
-
-
-def _loop(content: Mapping[str, Any]) -> StudyRow:
-    errors = []
-    for key in ("error_before", "error_after"):
-        pair = content[key]
-        value = pair["fit"] if pair["held_out"] is None else pair["held_out"]
-        errors.append(None if value is None else float(value))
-    return StudyRow(
-        effects=tuple(str(stage["effect"]) for stage in content["stages"]),
-        verdict=str(content["verdict"]),
-        error_before=errors[0],
-        error_after=errors[1],
-    )
-
-
-def results_table(rows: Sequence[StudyRow]) -> pd.DataFrame:
-    """Return what studies found as a table, one line each, without columns that nothing fills."""
-    lines = []
-    for row in rows:
-        line: dict[str, Any] = {}
-        for learner, found in row.learners.items():
-            line[f"{learner}_terms"] = found.text
-            line |= {f"{learner}_{quantity}": error for quantity, error in found.errors.items()}
-        line |= {"rivals": row.rivals, "undetermined": ", ".join(row.undetermined)}
-        line |= {"effects": ", ".join(row.effects), "verdict": row.verdict}
-        line |= {"error_before": row.error_before, "error_after": row.error_after}
-        lines.append(line)
-    return pd.DataFrame(lines).dropna(axis="columns", how="all")
 
 
 @dataclass(frozen=True)
@@ -139,7 +40,6 @@ class BatchResult(NotebookView):
 
     studies: tuple[StudyStatus, ...]  # in the order given
     index: Path = field(repr=False)  # the summary page
-    rows: tuple[StudyRow, ...] = ()  # what they found, in the same order
 
     @property
     def failed(self) -> list[StudyStatus]:
@@ -147,18 +47,13 @@ class BatchResult(NotebookView):
         return [study for study in self.studies if study.status == "failed"]
 
     def table(self) -> pd.DataFrame:
-        """Return how the studies ended and what they found as a table, one line each.
+        """Return how the studies ended as a table, one line each, with the verdict or the reason.
 
         Nothing in it depends on when or how often a study was run, as `studies` does.
         """
-        states = {
-            "study": [study.name for study in self.studies],
-            "task": [study.task for study in self.studies],
-            "outcome": [study.outcome for study in self.studies],
-            "reason": [s.text if s.outcome == "failed" else "" for s in self.studies],
-        }
-        found = results_table(self.rows)
-        return pd.concat([pd.DataFrame(states), found], axis="columns")
+        columns = ("name", "task", "outcome", "text")
+        lines = [[getattr(study, name) for name in columns] for study in self.studies]
+        return pd.DataFrame(lines, columns=["study", *columns[1:]])
 
     def _shown(self) -> Iterable[Any]:
         there = sum(study.outcome == "result" for study in self.studies)
@@ -244,13 +139,11 @@ class Summary:
     def __init__(self, out: Path, jobs: Sequence[tuple[str, str]]):
         self.out = out
         self._statuses = [StudyStatus(name, task, "waiting", "") for name, task in jobs]
-        self._rows = [StudyRow() for _ in jobs]
         self._last = -_PAGE_PAUSE
 
     def add(self, position: int, status: StudyStatus) -> None:
         """Take note of a study that has ended, on the page too unless that was just written."""
-        row = StudyRow() if status.status == "failed" else read_row(self.out / status.name)
-        self._statuses[position], self._rows[position] = status, row
+        self._statuses[position] = status
         if monotonic() - self._last >= _PAGE_PAUSE:
             with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
                 self.write()
@@ -258,11 +151,11 @@ class Summary:
     def write(self) -> BatchResult:
         """Write everything now and return how the studies ended."""
         self._last = monotonic()
-        result = BatchResult(tuple(self._statuses), self.out / PAGE, tuple(self._rows))
+        result = BatchResult(tuple(self._statuses), self.out / PAGE)
         write_text(self.out / STATES, json.dumps(result.to_json(), indent=2) + "\n")
         table = result.table().to_csv(index=False, lineterminator="\n")
         write_text(self.out / TABLE, table)
-        from discover.report.batch_report import batch_page  # late: it takes a second to import
+        from discover.report.page import batch_page  # late: it takes a second to import
 
-        write_text(result.index, batch_page(result.studies, result.rows))
+        write_text(result.index, batch_page(result.studies))
         return result

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
@@ -15,9 +16,9 @@ from uuid import uuid4
 from discover.batch.status import StudyStatus, now_and_then
 from discover.errors import InputError
 from discover.progress import Progress, on_stop
-from discover.python_child import python_command
 
-_COMMAND = python_command("-m", "discover.batch.worker")
+# without -P a jax.py in the working directory would be run, in a worker's own children too
+_COMMAND = [sys.executable, "-P", "-m", "discover.batch.worker"]
 _DEATHS = 3  # workers that one study may kill
 _DIED = "Several workers died while they ran it; look at their memory and time limits."
 _KEPT = "What was finished is kept; run again to go on."

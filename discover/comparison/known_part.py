@@ -14,11 +14,9 @@ from discover.comparison.flows import (
     comparison_flows,
     with_each_run,
 )
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.simulated import simulated
+from discover.comparison.outcome import LearnerOutcome, simulated
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect, StateEffect
-from discover.effects.signal import NORMAL_FORCE_GAIN
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.loop.final_model import augmented_fluid
@@ -198,8 +196,7 @@ def without_instrument(
     """
     require_possible(effects, data.dataset.runs)
     other = next((run for run in data.dataset if run.protocol.control != "rate"), None)
-    # an instrument is the same, whatever the loading
-    runs = [replace(run, loading=None) for run in data.dataset if run.flow == "shear"]
+    runs = [run for run in data.dataset if run.flow == "shear"]
     if not effects or not runs:
         return data, {}
     if other is not None:
@@ -216,8 +213,6 @@ def without_instrument(
         without[model.positions(known.name)[0]] = 0.0  # at zero amplitude an effect is none
     with np.errstate(all="ignore"):  # a law that diverges in a run tells nothing of it
         recorded, felt = model.observables([with_it, without], make_batch(runs))
-    force = [k.values[0] or 0.0 for k in effects if k.effect.name == NORMAL_FORCE_GAIN.name]
-    recorded[..., 1:] *= 1.0 + sum(force)
     added = np.nan_to_num(recorded - felt, posinf=0.0, neginf=0.0)
     by_run = {run.name: columns_of(own[: len(run)]) for run, own in zip(runs, added, strict=True)}
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.simulated import physics_of, simulated
+from discover.comparison.outcome import LearnerOutcome, physics_of, simulated
 from discover.dataset.run import Run
 from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
@@ -43,7 +42,6 @@ def train(
         sparse = TensorSINDy(
             library=library,
             optimizer=options.optimizer,
-            selection=options.selection,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,

@@ -1,16 +1,17 @@
-"""Outcome of one learner: its law, its predictions, where they lie, and what it leaves."""
+"""Outcome of one learner: its law, what it does in all flows, where they lie, what it leaves."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Real
+from jaxtyping import Float
 
-from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses
-from discover.comparison.simulated import simulated
+from discover import identify
+from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses, columns_of
 from discover.dataset.records.repeats import repeats_among
-from discover.laws.multimode import Fluid
+from discover.identify.physics_flows import time_scale
+from discover.laws import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.results import TermTables
 from discover.plain_numbers import plain
@@ -30,15 +31,14 @@ Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 class LearnerOutcome(TermTables):
     """Result of a learner with its predictions in every flow of the comparison.
 
-    `loss_history`: iterations and losses, shape (m,). `predictions`: by the key of the flow; None
-    where the law diverges. `physics`: from `PhysicsReport.to_json`; None where not made. `bands`:
-    by key, lowest and highest prediction over the members of an ensemble; None where one diverges.
+    `predictions`: by the key of the flow; None where the law diverges. `physics`: from
+    `PhysicsReport.to_json`; None where not made. `bands`: by key, lowest and highest prediction
+    over the members of an ensemble; None where one diverges.
     """
 
     learner: str  # name of the learner
     terms: tuple[RecoveredTerm, ...]  # the law term by term
     train_seconds: float  # wall-clock time of the fit
-    loss_history: tuple[Real[np.ndarray, " m"], Real[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""  # one sentence on how the fit ended
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
@@ -64,8 +64,8 @@ class LearnerOutcome(TermTables):
     ) -> "LearnerOutcome":  # fmt: skip
         """Return the outcome of a fit, with what the fluid it found does in every flow."""
         return cls(
-            result.learner, result.terms, result.train_seconds, result.loss_history, result.details,
-            result.message, predictions, bands=_bands(result, fluid, flows, predictions),
+            result.learner, result.terms, result.train_seconds, result.details, result.message,
+            predictions, bands=_bands(result, fluid, flows, predictions),
         )  # fmt: skip
 
     def to_state(self) -> dict[str, Any]:
@@ -85,10 +85,8 @@ class LearnerOutcome(TermTables):
         def numbers(values: Any) -> np.ndarray:
             return np.asarray(values, dtype=float)
 
-        iterations, losses = map(numbers, state["loss_history"])
         read = {
             "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
-            "loss_history": (iterations, losses),
             "predictions": arrays(state["predictions"], numbers),
             "bands": arrays(state.get("bands", {}), lambda ends: tuple(numbers(ends))),
         }
@@ -249,3 +247,51 @@ def _lack_of_fit(
     # moduli that are constant are those of a linear fluid, and of no dead sensor
     imposed = rates if all(flow.protocol.control in FOLLOWED for flow in training) else None
     return lack_of_fit(residuals, records, expectation, imposed, even, intervals)
+
+
+_PHYSICS_FLOWS = ("training", "held_out", "test")
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a fluid does in flows.
+
+    `predictions`: by the key of the flow; None where the law diverges. `seen`: what the checks of
+    its physics are made of.
+    """
+
+    predictions: Mapping[str, Stresses | None]
+    seen: identify.Seen
+
+
+def simulated(fluid: Fluid, flows: Sequence[Flow]) -> Simulated:
+    """Return what a fluid does in flows.
+
+    Training flows set the box beyond which the law extrapolates.
+    """
+    along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
+    training = [flow for flow in along if flow.kind == "training"] or along
+    time = time_scale(fluid)
+    weissenberg = time * max(flow.largest_rate for flow in training)
+    deborah = time * max(_frequency(flow) for flow in training)
+    protocols, times = [flow.protocol for flow in flows], [flow.times for flow in flows]
+    # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
+    seen = identify.see(fluid, protocols, times, weissenberg, max(deborah, weissenberg / 5.0))
+    pairs = zip(flows, seen.along.observed, strict=True)
+    return Simulated(
+        {flow.key: columns_of(o) if np.all(np.isfinite(o)) else None for flow, o in pairs}, seen
+    )
+
+
+def physics_of(found: Simulated, flows: Sequence[Flow]) -> dict[str, Any]:
+    """Return checks of a fluid's physical soundness along the flows, as JSON-able values."""
+    names = {i: flow.title for i, flow in enumerate(flows) if flow.kind in _PHYSICS_FLOWS}
+    return identify.check_physics(found.seen, names).to_json()
+
+
+def _frequency(flow: Flow) -> float:
+    """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
+    if flow.is_of_states:
+        return flow.frequency or 0.0
+    whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
+    return max(whole, flow.frequency or 0.0)

@@ -26,7 +26,6 @@ from discover.comparison.learning import Learning, study_library
 from discover.comparison.outcome import LearnerOutcome, expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
-from discover.comparison.time_left import ComparisonTime
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
 from discover.laws import LAWS, Fluid
@@ -34,6 +33,7 @@ from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
+from discover.loop.search_time import ComparisonTime
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
 from discover.progress import Progress, silent
@@ -127,7 +127,7 @@ def compare(
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
     several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
-    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out, trainings=1.0)
+    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)

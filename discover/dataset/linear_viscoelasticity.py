@@ -8,16 +8,13 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.linear.mode_search import ModeFit, ModeSearch, relative_moduli
+from discover.dataset.mode_search import ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.noise_model import independent_samples, rms
 from discover.statistics.noise.whiteness import FEWEST_FAST, noise_probability, separate_probability
-from discover.statistics.residual import slow_part
 
 MOST_MODES = 30
-# relative error below which no pattern is worth a word: rheometers are not that accurate
-FLOOR = 0.01
 # probability that noise leaves such a misfit, up to which it is taken to be none
 _SEEMS_NOISE = 0.05
 _SOLID = (
@@ -103,9 +100,6 @@ class RelaxationSpectrum:
     errors: dict[int, float]  # the smallest by number of modes
     # of the moduli in Pa², with a solvent's row and column last, in Pa s; None without a sweep
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
-    # root mean square of what in the misfit is no noise, and may be of too few modes; 0 where all
-    # may be noise, None where no number of modes follows the sweep
-    pattern: float | None = 0.0
     solvent_viscosity: float = 0.0  # η_s in Pa s
     elastic_modulus: float = 0.0  # G_e in Pa
     solid: str = ""  # what is to be known where G_e is more than G″ at the lowest frequency
@@ -182,15 +176,11 @@ def relaxation_spectrum(
         error = float(np.sqrt(fit.squared / measured.size))
         errors[fit.n_modes + held] = min(error, errors.get(fit.n_modes + held, np.inf))
     rows = _misfit(sweep, found)
-    is_noise = _seems_noise(rows)
-    least = min(fit.squared / max(measured.size - fit.n_constants, 1) for fit in fits)
-    coarse = rms(rows) ** 2 * rows.size / max(rows.size - likeliest.n_constants, 1) - least
     return replace(
         found,
         best_error=best.relative_error,
         errors=dict(sorted(errors.items())),
-        modulus_covariance=_covariance(sweep, found, rows, is_noise),
-        pattern=_pattern(rows, is_noise, coarse, _misfit(sweep, best)),
+        modulus_covariance=_covariance(sweep, found, rows),
     )
 
 
@@ -210,12 +200,12 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
     solid = ""
     if elastic > sweep.loss_modulus[slowest]:
         solid = _SOLID.format(sweep.angular_frequency[slowest], elastic, times[-1])
-    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, 0.0, solvent, elastic, solid)
+    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, solvent, elastic, solid)
     return replace(found, relative_error=rms(_misfit(sweep, found)))
 
 
 def _covariance(
-    sweep: LinearSweep, found: RelaxationSpectrum, rows: Float[np.ndarray, "2 n"], is_noise: bool
+    sweep: LinearSweep, found: RelaxationSpectrum, rows: Float[np.ndarray, "2 n"]
 ) -> Float[np.ndarray, "c c"]:
     """Return s² (AᵀA)⁻¹ of moduli and solvent, s² the misfit for each degree of freedom left.
 
@@ -228,7 +218,7 @@ def _covariance(
         sweep.angular_frequency, sweep.measured, found.relaxation_time, has_solvent
     )
     variance = np.sum(rows**2) / max(rows.size - design.shape[1], 1)
-    if not is_noise:
+    if not _seems_noise(rows):
         variance *= rows.size / sum(independent_samples(row) for row in rows)
     return variance * np.linalg.pinv(design.T @ design) * np.outer(amounts, amounts)
 
@@ -246,23 +236,3 @@ def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
     chance = len(rows) * min(separate_probability([row]) for row in rows)
     of_all = noise_probability(rows, np.ones_like(rows))
     return min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE
-
-
-def _pattern(
-    rows: Float[np.ndarray, "2 n"], is_noise: bool, coarse: float, left: Float[np.ndarray, "2 n"]
-) -> float | None:
-    """Return the root mean square of what in the misfit is no noise, and due to modes too few.
-
-    All of it in a sweep too short to tell; None if no number of modes leaves noise. `coarse`: what
-    more modes leave less, squared, beyond their freedom. `left`: misfit of the best.
-    """
-    error = rms(rows)
-    if rows.shape[1] < FEWEST_FAST:
-        return error
-    slow = 0.0 if is_noise else _slow(rows)
-    pattern = min(max(slow, float(np.sqrt(max(coarse, 0.0)))), error)
-    return None if _slow(left) > FLOOR and not _seems_noise(left) else pattern
-
-
-def _slow(rows: Float[np.ndarray, "2 n"]) -> float:
-    return float(np.sqrt(np.mean([slow_part(row) ** 2 for row in rows])))

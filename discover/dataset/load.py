@@ -81,8 +81,7 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     elif os.path.isfile(there[0] / TESTS_FILE):
         why = (
             f"The folder {said} holds tests at several temperatures ({TESTS_FILE}), and a fit "
-            "takes one. Make one sweep of all with discover data shift, or copy the table of one "
-            f"temperature to {SWEEP_FILE}."
+            f"takes one. Copy the table of one temperature to {SWEEP_FILE}."
         )
     else:
         why = (

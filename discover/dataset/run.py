@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,13 +35,6 @@ _COLUMNS = (
     *_NEEDED, "first_normal_stress_difference", "second_normal_stress_difference", "strain",
     "storage_modulus", "loss_modulus",
 )  # fmt: skip
-
-
-class Loading(NamedTuple):
-    """Deviation of one loading from another: a factor on every stress recorded of it."""
-
-    deviation: float  # standard deviation of the factor
-    noise: float | None = None  # relative noise of the record, where it is known
 
 
 def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[np.ndarray, " n"]:
@@ -79,17 +72,11 @@ class Run(NotebookView):
         Steps of the rate between two samples whose instants are fitted, or were.
     clock_factor
         Time on the instrument's clock is ``time / clock_factor``: not one for shifted data.
-    rate_is_measured, rate_error
-        Whether the rate was measured, or derived from strain, and not commanded; its relative
-        standard error where it is the mean of rates read with noise.
+    rate_is_measured
+        Whether the rate was measured, or derived from strain, and not commanded.
     rate_before, strain_before
         Rate in 1/s of the steady flow before t = 0, or zero; strain, added up without its sign,
         that the sample had seen in earlier runs.
-    weight, normal_weights
-        Of samples of the stress, and of N1 and N2, relative to other runs: one over the size of
-        their noise in units of the mean. Reported misfits do not contain them.
-    loading
-        How much a factor of its own on its record may differ from one; None where there is none.
 
     Examples
     --------
@@ -117,10 +104,6 @@ class Run(NotebookView):
     storage_modulus: Float[np.ndarray, " _"] | None = None
     loss_modulus: Float[np.ndarray, " _"] | None = None
     rate_steps: tuple[RateStep, ...] = ()
-    weight: float = 1.0
-    normal_weights: tuple[float, float] = (1.0, 1.0)
-    loading: Loading | None = None
-    rate_error: float = 0.0
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

@@ -53,8 +53,9 @@ class EffectParameter:
     """Parameter of an effect with its physical range; a fit that ends at the range is no finding.
 
     `low`, `high`: in `unit`, or in the data property `range_scale`. `range_source`: literature or
-    argument. `ends`: those of the range that something real can have. `first_trial`: first trial
-    value in `scale`; of an inner parameter its starting value. `endless`: of a time, what the
+    argument. `first_trial`: first trial value in `scale`; of an inner parameter its starting value.
+    `sound`: of an amplitude that is known where the effect is there, its value and the standard
+    deviation of that in a sound instrument. `endless`: of a time, what the
     effect equals where no record lasts as long. `absent`: what the effect is with this constant at
     `low`. `meaning`: in a few words; of a share, of what it is one. Empty: the name says it.
     """
@@ -68,7 +69,7 @@ class EffectParameter:
     first_trial: float = 0.1
     range_source: str = field(kw_only=True)
     range_scale: Scale = field(default="one", kw_only=True)
-    ends: tuple[Literal["low", "high"], ...] = field(default=(), kw_only=True)
+    sound: tuple[float, float] | None = field(default=None, kw_only=True)
     endless: str = field(default="", kw_only=True)
     absent: str = field(default="", kw_only=True)
     meaning: str = field(default="", kw_only=True)
@@ -97,7 +98,13 @@ class AbstractEffect(ABC):
     sample by sample, without regard to time or strain."""
     takes_numpy: ClassVar[bool] = False
     """Of an effect on a rate or a signal: whether it also takes arrays of NumPy, which of many
-    vectors and runs have axes of vectors, runs and times; each value those of vectors and ones."""
+    vectors and runs have axes of vectors, runs and times; each value those of vectors and ones.
+    Said beside the function: a function put in its place may not."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if {"felt_rate", "recorded_stress"} & vars(cls).keys():
+            cls.takes_numpy = vars(cls).get("takes_numpy", False)
 
 
 @dataclass(frozen=True)

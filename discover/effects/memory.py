@@ -44,7 +44,7 @@ THIXOTROPY = Thixotropy(
         ),
         EffectParameter(
             "build_up_time", r"t_\mathrm{b}", "s", low=1e-3, high=1e6, scale="run_time",
-            first_trial=0.3, ends=("high",), endless="damping_by_total_strain",
+            first_trial=0.3, endless="damping_by_total_strain",
             meaning="build-up time",
             range_source="from the Brownian time 6πηa³/kT of particles of 0.1 µm in water, some "
             "milliseconds, to structures that build up over weeks or never (Mewis & Wagner 2009)",
@@ -131,7 +131,7 @@ SOFTENING_BY_WORK = SofteningByWork(
         ),
         EffectParameter(
             "recovery_time", r"t_\mathrm{r}", "s", low=1e-3, high=1e6, scale="run_time",
-            first_trial=0.3, ends=("high",),
+            first_trial=0.3,
             range_source="like the build-up time of thixotropy, from milliseconds to never: "
             "rubber stays as soft as its first stretch made it (Mullins 1969)",
         ),

@@ -37,7 +37,7 @@ CONVECTIVE_CONSTRAINT_RELEASE = ConvectiveConstraintRelease(
             "does not change the length of the chains; at three times that it would have to",
         ),
         EffectParameter(
-            "beta", r"\beta", low=0.0, high=1.0, first_trial=0.5, ends=("low", "high"),
+            "beta", r"\beta", low=0.0, high=1.0, first_trial=0.5,
             absent="partly_retracting_strands",
             range_source="Likhtman & Graham 2003: the share of released constraints that counts, "
             "from none to all",

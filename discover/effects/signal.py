@@ -64,7 +64,7 @@ EDGE_FRACTURE = EdgeFracture(
         ),
         EffectParameter(
             "critical_strain", r"\gamma_\mathrm{c}", low=0.0, high=10.0, scale="strain",
-            first_trial=0.3, range_scale="strain", ends=("low",),
+            first_trial=0.3, range_scale="strain",
             range_source="an edge that is still whole at the largest strain has no effect; it may "
             "also be broken from the start",
         ),

@@ -109,7 +109,6 @@ BUILD_UP_TIME = EffectParameter(
     "build_up_time", r"t_\mathrm{b}", "s", low=1e-3, high=1e6, scale="run_time", first_trial=0.3,
     meaning="build-up time",
     range_source="as for thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
-    ends=("high",),
 )  # fmt: skip
 
 EXPONENT = EffectParameter(

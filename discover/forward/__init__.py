@@ -7,28 +7,16 @@ declared law, then those of every candidate effect. At zero amplitude an effect 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 from discover.forward.flows import Batch, TransientFlows, make_batch
-from discover.forward.records import (
-    OBSERVED,
-    Records,
-    data_scales,
-    even,
-    make_records,
-    names_of_loadings,
-)
+from discover.forward.scales import data_scales
 
 __all__ = [
     "MODULUS",
-    "OBSERVED",
     "RELAXATION_TIME",
     "AugmentedModel",
     "Batch",
     "DeclaredModel",
     "FreeParameter",
-    "Records",
     "TransientFlows",
     "data_scales",
-    "even",
     "make_batch",
-    "make_records",
-    "names_of_loadings",
 ]

@@ -188,9 +188,8 @@ class AugmentedFluid:
         if self._varying_law or self.varying_effects:
             places = decades(numbers.modulus, numbers.relaxation_time)
             if extra is not None:
-                own = self.structure.added_modes > 0
-                times = numbers.relaxation_time * (jnp.exp(theta[1]) if own else 1.0)
-                added_at = decades(numbers.modulus, times, extra.relaxation_time, beyond=own)
+                times = numbers.relaxation_time
+                added_at = decades(numbers.modulus, times, extra.relaxation_time)
                 places = jnp.append(places, added_at)
         law = self._law(theta, numbers, places)
         if extra is not None and not self._varying_law:

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import AbstractEffect, ModeEffect
+from discover.effects import AbstractEffect
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
 from discover.forward.flows import Batch
 from discover.forward.program import Predictor, Trials, program_of
@@ -48,7 +48,6 @@ class AugmentedModel:
             declared.fit_modulus,
             tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
             declared.step_instants,
-            declared.added_modes,
         )
         every_effect = structure.with_every_effect()
         program = program_of(structure)
@@ -114,31 +113,10 @@ class AugmentedModel:
         return list(range(at.start or 0, at.stop))
 
     @property
-    def adding_modes(self) -> list[str]:
-        """Names of the effects whose modes have constants by mode of their own."""
-        if not self.declared.added_modes:
-            return []
-        return [effect.name for effect in self.effects if isinstance(effect, ModeEffect)]
-
-    def mode_times(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " k"]:
-        """Return the times in s of the modes that have constants by mode, added ones last."""
-        return np.append(self.declared.relaxation_time * np.exp(theta[1]), self._added_times(theta))
-
-    def mode_places(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " k"]:
-        """Return log10(λ/λ̄) of these modes; see `decades`."""
-        modulus, times = jnp.asarray(self.declared.modulus), self.declared.relaxation_time
-        places = np.asarray(decades(modulus, jnp.asarray(times)))
-        added = self._added_times(theta)
-        if not added:
-            return places
-        scaled = jnp.asarray(times * np.exp(theta[1]))
-        return np.append(places, decades(modulus, scaled, jnp.asarray(added), beyond=True))
-
-    def _added_times(self, theta: np.ndarray) -> list[float]:
-        adding = [effect for effect in self.effects if effect.name in self.adding_modes]
-        at = {e: jnp.asarray(theta[self.positions(e.name)]) for e in adding}
-        modes = (e.mode(values) for e, values in at.items() if isinstance(e, ModeEffect))
-        return [float(time) for _, time in modes]
+    def mode_places(self) -> Float[np.ndarray, " k"]:
+        """log10(λ/λ̄) of the declared modes; see `decades`."""
+        modulus, times = self.declared.modulus, self.declared.relaxation_time
+        return np.asarray(decades(jnp.asarray(modulus), jnp.asarray(times)))
 
     def constant(self, name: str) -> tuple[FreeParameter, int]:
         """Return a constant by mode, of the law or the amplitude of an effect, and its position."""
@@ -172,7 +150,7 @@ class AugmentedModel:
         batch: Batch,
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials runs n 3"]:
-        """Return the predicted records, N1 = σ11 − σ22 and N2 = σ22 − σ33 in Pa, as in `OBSERVED`.
+        """Return the predicted records, N1 = σ11 − σ22 and N2 = σ22 − σ33 in Pa.
 
         All come from one integration. N1 and N2 are NaN where a test has none, as a sweep.
         """

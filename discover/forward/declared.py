@@ -13,7 +13,6 @@ from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
     KnownEffect,
-    ModeEffect,
     built_in_effects,
     make_effect,
 )
@@ -31,18 +30,15 @@ def decades(
     modulus: Float[Array, " k"],
     relaxation_time: Float[Array, " k"],
     of: Float[Array, " m"] | None = None,
-    beyond: bool = False,
 ) -> Float[Array, " m"]:
     """Return log10(λ/λ̄), with λ̄ the geometric mean of the times by viscosity.
 
     `of`: times in s, by default the declared ones. Beyond these the end counts, for a polynomial
-    says nothing there, unless `beyond`.
+    says nothing there.
     """
     own = jnp.log10(relaxation_time)
     viscosity = modulus * relaxation_time
-    asked = own if of is None else jnp.log10(of)
-    if not beyond:
-        asked = jnp.clip(asked, jnp.min(own), jnp.max(own))
+    asked = own if of is None else jnp.clip(jnp.log10(of), jnp.min(own), jnp.max(own))
     return asked - jnp.sum(viscosity * own) / jnp.sum(viscosity)
 
 
@@ -92,11 +88,9 @@ class DeclaredModel:
     `fit_modulus`, `fit_relaxation_time`: whether one factor on all moduli, or times, is fitted.
     `law_name`, `parameters`: of a named law; needed only if some are free.
     `linear_error`: relative error with which the modes describe the linear data they come from.
-    `linear_pattern`: relative size of what in it is no noise; None where no number of modes fits.
     `modulus_covariance`: of the moduli in Pa² (the solvent's last), shape (k, k) or (k + 1, k + 1).
     `step_instants`: how many instants of steps of the rate are fitted; see `Run.rate_steps`.
     `by_mode`: parameters of the law, and effects by their amplitude, that may differ by mode.
-    `added_modes`: how many modes that effects add have constants by mode of their own.
 
     Raises InputError if modes are none, or a constant by mode cannot be one, or has one mode alone.
     """
@@ -111,12 +105,10 @@ class DeclaredModel:
     parameters: tuple[tuple[str, float], ...] = ()
     free_parameters: tuple[FreeParameter, ...] = ()  # parameters of the law to fit
     linear_error: float = 0.0
-    linear_pattern: float | None = 0.0
     effects: tuple[KnownEffect, ...] = ()
     by_mode: tuple[str, ...] = ()
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
     step_instants: int = 0
-    added_modes: int = 0
 
     def __post_init__(self):
         for name in ("modulus", "relaxation_time"):
@@ -225,8 +217,8 @@ class DeclaredModel:
 
     @property
     def n_modes(self) -> int:
-        """How many modes have constants of their own, where constants differ by mode."""
-        return len(self.modulus) + self.added_modes
+        """How many modes are declared."""
+        return len(self.modulus)
 
     @property
     def by_mode_slices(self) -> dict[str, slice]:
@@ -278,8 +270,6 @@ class Structure(NamedTuple):
     """Constants that may differ from mode to mode, and where what varies them begins and ends."""
     step_instants: int = 0
     """How many instants of steps of the rate are fitted, each as a share of its interval."""
-    added_modes: int = 0
-    """How many modes that effects add have constants by mode of their own."""
     law_numbers: int = 0
     """How many numbers of the law stand in the vector, where it is no law with a name."""
 
@@ -288,11 +278,6 @@ class Structure(NamedTuple):
         asked = {effect.name: effect for effect in self.effects}
         every = {name: asked.pop(name, effect) for name, effect in built_in_effects().items()}
         every |= {name: asked[name] for name in sorted(asked)}
-        if self.added_modes:
-            # their constants follow one another in the order of these modes
-            added = [e for e in self.effects if isinstance(e, ModeEffect)]
-            plain = [e for e in every.values() if not isinstance(e, ModeEffect)]
-            every = {effect.name: effect for effect in (*added, *plain)}
         return self._replace(effects=tuple(every.values()), fit_modulus=True)
 
     def without_constants(self) -> "Structure":

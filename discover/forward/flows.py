@@ -13,7 +13,6 @@ from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
-from discover.forward.records import Records, make_records
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
@@ -368,22 +367,13 @@ class Batch(eqx.Module):
 
     `parts`, `rows`: the flows of each control, simple shear apart, and which runs they are.
     `moduli`: of each run that is a modulus, which one, and where its states stand in their part.
+    `recorded`: of all runs in their order, in Pa or as a strain; zero at padding.
     """
 
     parts: tuple[Flows, ...]
     rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
     moduli: tuple[Places, ...] = eqx.field(static=True)
-    records: Records  # of all runs in their order, of one kind, in arrays of NumPy
-
-    @property
-    def weight(self) -> Float[np.ndarray, "runs n"]:
-        """Weights of what was recorded, zero at padding."""
-        return np.asarray(self.records.weight)
-
-    @property
-    def recorded(self) -> Float[np.ndarray, "runs n"]:
-        """What was recorded, in Pa or as a strain."""
-        return np.asarray(self.records.recorded)
+    recorded: Float[np.ndarray, "runs n"]
 
 
 def make_batch(runs: Sequence[Run], strain_step: float = 0.25, **how: Any) -> Batch:
@@ -414,5 +404,7 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25, **how: Any) -> Ba
         else:
             part = transients(own, steps)
         parts.append(part)
-    records = make_records(runs, max(map(len, runs)), "run").of_one_kind()
-    return Batch(tuple(parts), rows, moduli, records)
+    recorded = np.zeros((len(runs), max(map(len, runs))))
+    for row, run in zip(recorded, runs, strict=True):
+        row[: len(run)] = run.recorded
+    return Batch(tuple(parts), rows, moduli, recorded)

@@ -62,6 +62,7 @@ class Program:
         self._signal = sorted(signal, key=lambda effect: effect.is_zero)
         self.averages = [e for e in structure.effects if isinstance(e, RadialAverage)]
         self._of_torque = [effect for effect in self._signal if not effect.of_force]
+        self.of_force = [e for e in self._signal if e.of_force and e.acts_on_steady_states]
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self._made_from = (structure, build)
@@ -355,7 +356,10 @@ class Predictor:
     def of_part(
         self, trials: Trials, batch: Batch, number: int, normal: bool = False
     ) -> Float[np.ndarray, "trials rows n kinds"]:
-        """Return the records of a part, and if `normal` N1 and N2: NaN where a test has none."""
+        """Return the records of a part, and if `normal` N1 and N2: NaN where a test has none.
+
+        These are as a transducer of force records them that acts sample by sample.
+        """
         found, part = self.whole(trials, batch, number, normal), batch.parts[number]
         if not normal:
             return found
@@ -363,6 +367,10 @@ class Predictor:
             return np.pad(found, [*[(0, 0)] * 3, (0, 2)], constant_values=np.nan)
         with np.errstate(invalid="ignore", over="ignore"):  # what ran away
             both = normal_stress_differences(part.kinematics, found[..., 1], found[..., 2:6])
+        places, still = np.arange(2.0), np.zeros_like(both)
+        for effect in self.program.of_force:
+            values = trials.thetas[:, self.program.fluid.slices[effect.name]].T[..., *[None] * 3]
+            both = effect.recorded_stress(values, Record(places, still, both, 1.0))
         return np.concatenate([found[..., :1], both], axis=-1)
 
     def whole(

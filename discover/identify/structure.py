@@ -5,7 +5,7 @@ N1 and N2. First order; where the law is a polynomial, exact arithmetic decides 
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
 from typing import Any, Literal
@@ -18,9 +18,8 @@ from jaxtyping import Array, Bool, Float
 from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics
+from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics, with_cheap_tangents
 from discover.forward.of_fluids import pieces_in_time
-from discover.forward.tangents import with_cheap_tangents
 from discover.identify.exact_series import compare_series
 from discover.identify.relations import (
     Direction,
@@ -30,7 +29,7 @@ from discover.identify.relations import (
     weak_directions,
 )
 from discover.identify.side_by_side import joint_library
-from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
+from discover.identify.twins import HiddenStresses, hidden_stresses
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.laws.expansion import expansion_of, law_of_terms
@@ -119,7 +118,7 @@ class LawStructure(NotebookView):
     """What the experiment can determine around one nominal law.
 
     `exact`, `weak`: unseen directions, and the weakest of the others. `n_exact_with_N1`: exact ones
-    left if N1 were measured. `one_more`: by quantity, the further term that leaves it most open.
+    left if N1 were measured.
     """
 
     name: str
@@ -130,7 +129,6 @@ class LawStructure(NotebookView):
     quantities: tuple[QuantityVerdict, ...]  # verdicts on N1 and N2 from what is observed
     n_exact_with_N1: int
     N2_with_N1: Verdict  # verdict on N2 if N1 were measured as well
-    one_more: Mapping[str, OneTermMore] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
@@ -162,7 +160,6 @@ class LawStructure(NotebookView):
             "quantities": [asdict(q) for q in self.quantities],
             "unseen_directions_with_N1": self.n_exact_with_N1,
             "N2_with_N1": self.N2_with_N1,
-            "one_term_more": {q: one.to_json() for q, one in self.one_more.items()},
             "text": self.text,
         }
 
@@ -283,10 +280,8 @@ def _at(
     elif n2_with_n1 == "undetermined" and verdicts[1].verdict == "undetermined":
         text = verdicts[1].text + " Measuring N1 as well would not change this."
         verdicts = (verdicts[0], replace(verdicts[1], text=text))
-    support = [library.names.index(term) for term in law.coefficients]
-    moved = each_moved(library.names, support, blocks, list(observed), total)
     return LawStructure(
-        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1, moved
+        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1
     )
 
 

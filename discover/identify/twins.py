@@ -6,7 +6,7 @@ the unmeasured normal stresses, decided in exact arithmetic on the Taylor series
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -24,7 +24,6 @@ from discover.identify.relations import feels_33, term_relations
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.programs import compiled
 from discover.protocols.protocol import stack_protocols
-from discover.statistics import HALF_BAND
 from discover.summary_view import NotebookView
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
@@ -319,69 +318,3 @@ def _arrivals(law, protocols, grids):
         return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
 
     return jax.vmap(one)(protocols, grids)
-
-
-_UNSEEN = 1e-7
-"""Share of a combination that is seen, below which it is an exact direction: those are judged by
-themselves, in exact arithmetic."""
-
-
-@dataclass(frozen=True)
-class OneTermMore:
-    """Term that leaves a quantity most open if it is fitted jointly.
-
-    `per_noise`: half of the quantity's 95 % interval, rms over N1's, over the relative noise.
-    """
-
-    term: str  # its name
-    per_noise: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as JSON-able values."""
-        return asdict(self)
-
-
-def one_term_more(
-    names: Sequence[str],
-    support: Sequence[int],
-    observed: Float[np.ndarray, "rows terms"],
-    quantity: Float[np.ndarray, "others terms"],
-    samples: int,
-) -> OneTermMore | None:
-    """Return the term that leaves a quantity most open; None where none can be seen.
-
-    `support`: positions of the law's terms. `observed`, `quantity`: changes per unit of each
-    coefficient, columns scaled to rms over that of the records. `samples`: of what is observed.
-    """
-    worst = None
-    for extra, name in enumerate(names):
-        columns = [*support, extra]
-        sizes = np.linalg.norm(observed[:, columns], axis=0)
-        if extra in support or np.any(sizes == 0.0):
-            continue
-        _, seen, turned = np.linalg.svd(observed[:, columns] / sizes, full_matrices=False)
-        if len(seen) < len(columns) or seen[-1] < _UNSEEN * seen[0]:
-            continue
-        # a column of the root is a combination of the constants that varies by one deviation
-        root = (turned.T / seen) / sizes[:, None]
-        width = HALF_BAND * float(np.linalg.norm(quantity[:, columns] @ root)) / np.sqrt(samples)
-        if worst is None or width > worst.per_noise:
-            worst = OneTermMore(name, width)
-    return worst
-
-
-def each_moved(
-    names: Sequence[str],
-    support: Sequence[int],
-    blocks: Mapping[str, Float[np.ndarray, "rows terms"]],
-    observed: Sequence[str],
-    samples: int,
-) -> dict[str, OneTermMore]:
-    """Return `one_term_more` of every quantity that is not observed, by its name."""
-    stacked = np.concatenate([blocks[q] for q in observed])
-    found = {
-        q: one_term_more(names, support, stacked, block, samples)
-        for q, block in blocks.items()
-        if q not in observed
-    }
-    return {q: one for q, one in found.items() if one is not None}

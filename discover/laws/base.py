@@ -191,8 +191,7 @@ class NamedLaw:
     ranges, dimensionless. `range_sources`: literature or argument for each range. `written`:
     returns h with its constants as letters, to be written out; None if nobody said. `is_one_mode`:
     whether at small strain the law is one Maxwell mode; otherwise ``"any"`` leaves it out, as the
-    modes of a sweep are not its own. `contains`: laws that this one is, exactly or in the limit,
-    with some constants at these values.
+    modes of a sweep are not its own.
     """
 
     title: str  # name as a rheologist writes it
@@ -202,7 +201,6 @@ class NamedLaw:
     source: str = ""  # literature on the law
     written: Callable[[], IsotropicFunction] | None = None
     is_one_mode: bool = True
-    contains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def described(self, values: Mapping[str, float]) -> str:
         """Return the title with the values of the parameters, by their names in study files."""

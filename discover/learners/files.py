@@ -22,7 +22,7 @@ from discover.errors import InputError
 from discover.learners.plain_values import PlainReader, PlainWriter
 from discover.plain_numbers import parse_json
 
-FORMAT, VERSION = "discover estimator", 1
+FORMAT, VERSION = "discover estimator", 2
 _HEADER = "estimator.json"
 _LARGEST = 2**28
 """Bytes that all parts of a file unpack to, at most: an estimator of megabytes is a large one."""

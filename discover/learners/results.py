@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float, Num
 
 from discover.dataset.run import Run
 from discover.equations import Equation, HasEquation, combined, law_parts
@@ -33,10 +32,6 @@ class RecoveredTerm(LawTerm):
         95 % intervals of the inner parameters.
     inner_at_one
         Inner parameters (value, low, high) if the coefficient is one, where it may be.
-    ci95_given_equal_modes
-        Interval of one coefficient for all modes, where `ci95` lets them differ.
-    ci95_given_declared
-        Interval with the declared modulus and relaxation time, where `ci95` lets them change.
     """
 
     coefficient_penalised: float | None = field(default=None, kw_only=True)
@@ -45,8 +40,6 @@ class RecoveredTerm(LawTerm):
     inner_at_one: Mapping[str, tuple[float, float, float]] = field(
         default_factory=dict, kw_only=True
     )
-    ci95_given_equal_modes: Interval | None = field(default=None, kw_only=True)
-    ci95_given_declared: Interval | None = field(default=None, kw_only=True)
 
     @property
     def is_told_from_zero(self) -> bool:
@@ -85,29 +78,18 @@ class TermTables(NotebookView):
     def path_table(self) -> pd.DataFrame:
         """Return the best law of each size, from no term on; empty where the learner has no path.
 
-        Columns: relative misfit on all runs and on runs left out (``held_out``), log evidence, and
-        the rules that choose the law.
+        Columns: relative misfit on all runs and on runs left out (``held_out``), log evidence, by
+        which a law is chosen.
         """
-        lines = []
-        for member in self.details.get("path", ()):
-            by = [rule for rule, terms in self._chosen().items() if set(terms) == _support(member)]
-            lines.append(
-                {
-                    "size": member["size"],
-                    "terms": ", ".join(member["support"]) or "no term",
-                    **{name: member[name] for name in ("misfit", "held_out", "log_evidence")},
-                    "chosen_by": ", ".join(by),
-                }
-            )
+        lines = [
+            {
+                "size": member["size"],
+                "terms": ", ".join(member["support"]) or "no term",
+                **{name: member[name] for name in ("misfit", "held_out", "log_evidence")},
+            }
+            for member in self.details.get("path", ())
+        ]
         return pd.DataFrame(lines)
-
-    def selectors_table(self) -> pd.DataFrame:
-        """Return whether each rule of choice takes each term; empty where there is no path."""
-        chosen = self._chosen()
-        terms = list(dict.fromkeys(term for support in chosen.values() for term in support))
-        lines = {rule: [term in support for term in terms] for rule, support in chosen.items()}
-        table = pd.DataFrame.from_dict(lines, orient="index", columns=terms, dtype=bool)
-        return table.rename_axis("rule")
 
     def inclusion_table(self) -> pd.DataFrame:
         """Return the probability of each term, were the law among those fitted."""
@@ -129,9 +111,6 @@ class TermTables(NotebookView):
             for row in self.details.get("rivals", ())
         ]
         return pd.DataFrame(lines)
-
-    def _chosen(self) -> Mapping[str, Sequence[str]]:
-        return (self.details.get("selectors") or {}).get("chosen") or {}
 
     def _shown(self) -> Iterable[Any]:
         yield f"{self.learner}: {self.message}"
@@ -174,10 +153,6 @@ def _determined(
     return "yes, if the law is in the library"
 
 
-def _support(member: Mapping[str, Any]) -> set[str]:
-    return set(member["support"])
-
-
 @dataclass(frozen=True)
 class LearnerResult(HasEquation, TermTables):
     """Learned law and how it was learned.
@@ -192,8 +167,6 @@ class LearnerResult(HasEquation, TermTables):
         The law, or its projection on a library.
     train_seconds
         Wall-clock time of `fit`.
-    loss_history
-        Iterations and losses, both of shape (m,).
     details
         What else this learner can say; JSON-able.
     message
@@ -206,9 +179,6 @@ class LearnerResult(HasEquation, TermTables):
     law: AbstractConstitutiveLaw
     terms: tuple[RecoveredTerm, ...]
     train_seconds: float = 0.0
-    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]] = field(
-        default_factory=lambda: (np.zeros(0), np.zeros(0))
-    )
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -13,14 +12,8 @@ from discover.dataset.material_functions import as_compared
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.first_use import require_double
-from discover.forward import Records, make_records
-from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.grid import STRAIN_STEP
-from discover.forward.of_fluids import pieces_in_time
-from discover.forward.records import Mean
-from discover.laws.multimode import Fluid
+from discover.forward.flow_batch import FlowBatch
 from discover.learners.settings import PerMode
-from discover.programs import on_device
 from discover.protocols import settled
 from discover.protocols.kinematics import STATES
 from discover.words import percent_of
@@ -73,25 +66,6 @@ def require_signal(runs: Sequence[Run]) -> None:
                 f"The shear stress of the run {run.name!r} is zero throughout: it says nothing of "
                 "the law. Leave the run out."
             )
-
-
-def laid_out(
-    runs: Sequence[Run], known: Fluid, mean: Mean = "values", **limits: Any
-) -> tuple[FlowBatch, Records]:
-    """Return runs on time grids in the steps of the known fluid, and what was recorded in them.
-
-    `mean`: whether each run counts alike, or each value. `**limits`: of steps, as of `make_grids`.
-    """
-    n = max(map(len, runs))
-    flows = lay_out(
-        [run.protocol for run in runs],
-        [run.time for run in runs],
-        n,
-        relaxation_time=known.settling_time,
-        pieces=pieces_in_time(known, runs, limits.get("strain_step", STRAIN_STEP)),
-        **limits,
-    )
-    return flows, jax.tree.map(on_device, make_records(runs, n, mean, 1))
 
 
 AFFORDABLE = 6000.0

@@ -25,8 +25,6 @@ class StageParameter:
         95 % interval over all explanations that have the parameter.
     unit
         Of both.
-    ci95_given_effects
-        95 % interval if these effects are the right ones; None where only this one is known.
     at_end
         Which end of its physical range the value is at; empty inside.
     """
@@ -34,7 +32,6 @@ class StageParameter:
     value: float
     ci95: tuple[float, float]
     unit: str
-    ci95_given_effects: tuple[float, float] | None = field(default=None, kw_only=True)
     at_end: Literal["", "low", "high"] = field(default="", kw_only=True)
 
     @property

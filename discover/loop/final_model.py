@@ -75,8 +75,6 @@ def declared_law(
     """
     law = declared.law_with(theta[2 : 2 + len(declared.free_parameters)])
     differing = {name: one.values for name, one in by_mode.items()}
-    if by_mode and declared.added_modes:
-        return None  # one of the modes is that of an effect
     try:
         parts = law_parts_by_mode(law, differing, len(declared.modulus))
     except InputError:

@@ -33,11 +33,11 @@ from discover.loop.final_model import (
     states_of,
 )
 from discover.loop.loop_result import LoopResult
+from discover.loop.measured_rates import instants_found
 from discover.loop.parts import CandidateScore, LawFit, Stage
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
-from discover.loop.step_instants import instants_found
 from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
 from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of
@@ -83,7 +83,7 @@ class Ended(Path):
     def _by_mode(self, name: str) -> ConstantByMode:
         fit, model = self.fit, self.posterior.problem.model
         constant, at = model.constant(name)
-        places = model.mode_places(self.theta)
+        places = model.mode_places
         every = [at, *model.varying(name)]
         lot = np.random.default_rng(0).standard_normal((_DRAWS, len(every)))
         chosen = [fit.free.index(one) for one in every]
@@ -105,7 +105,7 @@ class Ended(Path):
         values = np.asarray(of_modes(own[:, 0], own[:, 1:]))[0]
         width = constant.high - constant.low
         told = high - low < (_FEWEST_TOLD * width if np.isfinite(width) else 4.0 * np.abs(values))
-        times = model.mode_times(self.theta)
+        times = model.declared.relaxation_time * np.exp(self.theta[1])
         modes = tuple(
             ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
             for t, v, a, b, k in zip(times, values, low, high, told, strict=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,9 +45,6 @@ from discover.loop.run_record import RunRecord
 from discover.plain_numbers import json_text, plain
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
-
-if TYPE_CHECKING:
-    import xarray
 
 
 @dataclass(frozen=True)
@@ -232,25 +229,6 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
 
     def _estimates(self) -> list[Estimate]:
         return self.answer.estimates
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """Return explanations, constants and predictions with named dimensions, for xarray.
-
-        Along ``explanation``, the likeliest first and ``unexplained`` last: ``probability``,
-        ``error_fit``, ``error_held_out``, ``constant_by_explanation`` and ``predicted``. Along
-        ``effect``: ``inclusion``. Along ``constant``, spelled ``effect.parameter``: the model that
-        was found, ``constant_found`` with ``constant_low95`` and ``constant_high95``, in the units
-        of the coordinate ``unit``. Along ``sample``, with ``run``, ``role``, ``quantity``,
-        ``time_s``, ``strain`` and ``rate_1_s``: ``measured``, ``declared``, ``found``, and the
-        band of all explanations, ``low95`` to ``high95``, in Pa, or strains where the strain was
-        recorded. What is unknown is NaN. Explanations are no draws from a posterior: weigh them by
-        their probability.
-
-        Raises InputError if xarray is not installed (extra ``xarray``).
-        """
-        from discover.loop.labelled import labelled_loop
-
-        return labelled_loop(self)
 
     def errors_table(self) -> pd.DataFrame:
         """Return the mean relative errors before and after, on fitted and on held-out runs."""

@@ -1,4 +1,7 @@
-"""A residual read as a rheologist would: on what it depends, and of which waves it is made."""
+"""A residual read as a rheologist would: how it changes from run to run, and of which waves it is.
+
+On what it depends within a run, free functions say (`inference.engine.free_functions`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -10,7 +13,6 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import permutation_test, rankdata
 
 from discover.loop.run_record import RunRecord
-from discover.statistics.noise.noise_model import rms
 from discover.words import p_value, percent_of
 
 HARMONICS = 5
@@ -116,30 +118,11 @@ def read_wave(record: RunRecord, model: int = -1) -> Wave | None:
     )
 
 
-_BINS = 24
-_DECADES = 30.0
-_SHARED = 0.3
-"""Share of the squared residual that runs must have in common along a coordinate."""
-_AHEAD = 0.1
-"""By how much a coordinate must lead the next to be named alone."""
-
 _FEWEST_RUNS = 5  # with fewer no order of runs is improbable enough
 _PROBABILITY = 0.05
 _PERMUTATIONS = 9999
 
 _ABOVE_NOISE = 4.0  # in a run of its own a drift of chance reaches three
-
-
-@dataclass(frozen=True)
-class Collapse:
-    """How much of the residual the runs share along a coordinate.
-
-    `coordinate`: what the residuals of all runs were drawn against. `share`: of the squared
-    residual, that a function of this coordinate alone explains.
-    """
-
-    coordinate: str
-    share: float
 
 
 @dataclass(frozen=True)
@@ -161,33 +144,17 @@ class Trend:
 class Reading:
     """A residual, read.
 
-    `collapses`: coordinates, the one that explains most first. `trends`: from run to run, the least
-    probable first; only those beyond chance. `waves`: one for each oscillating run.
+    `trends`: from run to run, the least probable first; only those beyond chance. `waves`: one for
+    each oscillating run.
     """
 
-    collapses: tuple[Collapse, ...]
     trends: tuple[Trend, ...]
     waves: tuple[Wave, ...]
 
     @property
     def sentences(self) -> list[str]:
         """What the reading says, each in a sentence; empty where nothing stands out."""
-        return [*self._along(), *self._from_run_to_run(), *self._oscillating()]
-
-    def _along(self) -> list[str]:
-        if not self.collapses or self.collapses[0].share < _SHARED:
-            return []
-        best = self.collapses[0]
-        alike = [c.coordinate for c in self.collapses if best.share - c.share < _AHEAD]
-        if len(alike) > 1:
-            return [
-                f"The residuals collapse onto one curve ({100 * best.share:.0f} % of the variance) "
-                f"against {', '.join(alike[:-1])} and {alike[-1]} alike."
-            ]
-        return [
-            f"Plotted against {best.coordinate}, the residuals collapse onto one curve "
-            f"({100 * best.share:.0f} % of the variance). {_HINTS[best.coordinate]}"
-        ]
+        return [*self._from_run_to_run(), *self._oscillating()]
 
     def _from_run_to_run(self) -> list[str]:
         sentences = []
@@ -234,115 +201,25 @@ class Reading:
         return {"sentences": self.sentences, **asdict(self)}
 
 
-_HINTS = {
-    "time": "Suspects: a slow mode, an offset, drift.",
-    "time on the instrument's clock": "The instrument answers on its own clock: look at its "
-    "motor, its transducer and its drift.",
-    "strain": "Suspects: the nonlinear response, edge fracture.",
-    "shear rate": "Suspects: slip, viscous heating, a solvent, a missing mode.",
-    "stress": "Suspects: compliance, wall slip, torque calibration.",
-    "phase of the oscillation": "It repeats in every cycle: see the harmonics below.",
-}
-
-
 def _plain(name: str) -> str:
     return name.replace("_", " ")
 
 
 def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
-    """Return what the residuals of some runs depend on.
+    """Return how the residuals of some runs change from run to run, and their waves.
 
     `records`: runs with their predictions. `model`: which prediction: 0 for the declared model, −1
     for the augmented one.
     """
-    # strains, rates and stresses of a shear and of an extension have no scale in common
-    # only records of one kind fall together; a steady state knows neither time nor strain
+    # strains, rates and stresses of a shear and of an extension have no scale in common, so records
+    # of one kind are read together; a steady state knows neither time nor strain
     kinds = [(r.flow, r.quantity) for r in records if r.is_transient]
     if not kinds:
-        return Reading((), (), ())
+        return Reading((), ())
     commonest = max(kinds, key=kinds.count)
     records = [r for r in records if r.is_transient and (r.flow, r.quantity) == commonest]
     waves = tuple(w for r in records if (w := read_wave(r, model)) is not None)
-    return Reading(_collapses(records, model), _trends(records, model), waves)
-
-
-def coordinates(records: Sequence[RunRecord]) -> dict[str, list[np.ndarray]]:
-    """Return what the samples of all runs can be drawn against, by name."""
-    found = {
-        "time": [r.time for r in records],
-        "strain": [np.abs(r.strain) for r in records],
-        "shear rate": [r.rate for r in records],
-    }
-    if all(r.quantity != "strain" for r in records):
-        found["stress"] = [r.measured for r in records]
-    if any(np.ptp(r.time - r.instrument_time) > 0 for r in records):
-        found["time on the instrument's clock"] = [r.instrument_time for r in records]
-    frequencies = [oscillation(r) for r in records]
-    if all(w is not None for w in frequencies):
-        found["phase of the oscillation"] = [
-            np.mod(r.time * w / (2.0 * np.pi), 1.0)
-            for r, w in zip(records, frequencies, strict=True)
-            if w is not None
-        ]
-    return found
-
-
-def _collapses(records: Sequence[RunRecord], model: int) -> tuple[Collapse, ...]:
-    """Return the share of the squared residual that runs have in common along each coordinate.
-
-    Samples are sorted into bins along the coordinate, logarithmic where it runs over decades. What
-    the others have in a bin on average predicts each run: a run on its own explains nothing.
-    """
-    if len(records) < 2:
-        return ()
-    residual = [r.relative_residual[model] for r in records]
-    total = sum(float(np.mean(row**2)) for row in residual)
-    if total == 0.0:
-        return ()
-    found = []
-    for name, values in coordinates(records).items():
-        if name == "stress" and _predicts_nothing(records, model):
-            continue
-        every = np.concatenate(values)
-        if np.ptp(every) == 0.0:
-            continue
-        edges = _edges(every)
-        means = np.full((len(records), _BINS), np.nan)
-        places = [
-            np.clip(np.searchsorted(edges, v, side="right") - 1, 0, _BINS - 1) for v in values
-        ]
-        for i, (place, row) in enumerate(zip(places, residual, strict=True)):
-            counts = np.bincount(place, minlength=_BINS)
-            sums = np.bincount(place, row, minlength=_BINS)
-            means[i, counts > 0] = sums[counts > 0] / counts[counts > 0]
-        left = 0.0
-        for i, (place, row) in enumerate(zip(places, residual, strict=True)):
-            others = np.delete(means, i, axis=0)
-            seen = np.any(np.isfinite(others), axis=0)
-            predicted = np.zeros(_BINS)
-            predicted[seen] = np.nanmean(others[:, seen], axis=0)
-            left += float(np.mean((row - predicted[place]) ** 2))
-        found.append(Collapse(name, max(0.0, 1.0 - left / total)))
-    return tuple(sorted(found, key=lambda c: -c.share))
-
-
-def _predicts_nothing(records: Sequence[RunRecord], model: int) -> bool:
-    """Return whether predictions are about zero: a residual is the stress, sign reversed."""
-    return all(
-        rms(record.predicted[model]) < _ABOUT_ZERO * rms(record.measured) for record in records
-    )
-
-
-_ABOUT_ZERO = 0.1
-"""Prediction over measurement, root mean square, below which there is none to speak of."""
-
-
-def _edges(values: np.ndarray) -> Float[np.ndarray, " bins"]:
-    """Return the lower edges of the bins: equal ratios where the values run over decades."""
-    low, middle, high = np.percentile(values, [1.0, 10.0, 100.0])
-    if low > 0 and high > _DECADES * middle:
-        return np.geomspace(low, high, _BINS, endpoint=False)
-    return np.linspace(low, high, _BINS, endpoint=False)
+    return Reading(_trends(records, model), waves)
 
 
 def differences(records: Sequence[RunRecord]) -> dict[str, Float[np.ndarray, " runs"]]:

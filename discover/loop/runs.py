@@ -11,7 +11,7 @@ from discover.dataset.records.repeats import count_flows, require_no_copies
 from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.loop.step_instants import with_rate_steps
+from discover.loop.measured_rates import with_rate_steps
 from discover.protocols import strains
 from discover.protocols.kinematics import STATES
 from discover.statistics.noise.noise_model import rms

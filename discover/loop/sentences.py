@@ -23,12 +23,12 @@ EXPLAINED = ("effects_added", "no_effect_needed")
 _EVEN = 0.5
 
 
-def several(names: Sequence[str], word: str) -> str:
+def several(names: Sequence[str]) -> str:
     """Return the first of several names, and how many more there are."""
     shown = list(names[:MOST_NAMES])
     if more := len(names) - len(shown):
         shown.append(f"{more} more")
-    return f" {word} ".join(shown)
+    return " and ".join(shown)
 
 
 def untested_by(result: Any) -> str:
@@ -91,7 +91,7 @@ def what_to_measure_next(result: Any) -> str:
     check, title = _as_clause(doubtful.check), effect_title(doubtful.effect)
     if not doubtful.aliases:
         return f"To confirm {title}, {check}."
-    others = several([*map(effect_title, doubtful.aliases)], "and")
+    others = several([*map(effect_title, doubtful.aliases)])
     return f"To distinguish {title} from {others}, {check}."
 
 
@@ -200,7 +200,7 @@ def _telling_test(result: Any) -> str:
     titles = [effects_title(effects) for effects in following.explanations]
     first, *_ = best.pairs
     chosen = first[0]
-    others = several([titles[j] for i, j in best.pairs if i == chosen], "and")
+    others = several([titles[j] for i, j in best.pairs if i == chosen])
     what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
     title = f"{best.title[:1].upper()}{best.title[1:]}"
     if any(record.shift != 1.0 for record in result.records):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discover.dataset import Dataset, Run
-from discover.dataset.records.repeats import with_loadings
+from discover.dataset.records.repeats import require_loadings
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -25,12 +25,11 @@ from discover.inference.engine.fits import Fitter
 from discover.inference.engine.search import Search
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
+from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
 from discover.loop.run_record import errors_of
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
-from discover.loop.scattered_rates import smoothed, unfelt_scatter
-from discover.loop.step_instants import with_places
 from discover.words import unknown_name
 
 Say = Callable[[str], None]
@@ -90,7 +89,7 @@ class Task:
             raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
         fitted, held, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
         for some in (fitted, held):
-            with_loadings(some, loading, noise)  # for what it refuses
+            require_loadings(some, loading)
         declared, every, _ = with_places(declared, [*fitted, *held], [])
         fitted, held = every[: len(fitted)], every[len(fitted) :]
         require_samples(fitted, declared)
@@ -224,7 +223,6 @@ def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
         free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],
         solvent_viscosity=declared.solvent_viscosity,
         linear_error=declared.linear_error,
-        linear_pattern=declared.linear_pattern,
         modulus_covariance=declared.modulus_covariance,
         effects=declared.effects,
         step_instants=declared.step_instants,

@@ -173,7 +173,6 @@ class Compiled(Generic[P, R]):
         self._function: Any = function
         self._made_from = made_from
         self._runs_long = runs_long
-        self._asked_for: dict[str, Any] = {}
         self._traced: Any = eqx.filter_jit(function)
         self._programs: dict[Any, Callable[[Any, Any, Sequence[Any]], R]] = {}
         self._lock = threading.RLock()
@@ -182,10 +181,6 @@ class Compiled(Generic[P, R]):
     def __reduce__(self) -> str:
         # by name, as a function: another process makes programs of its own
         return self._function.__qualname__
-
-    def ask_for(self, **options: Any) -> None:
-        """Have what is compiled from here on compiled with options of XLA's, beside the usual."""
-        self._asked_for = options
 
     def forget(self) -> None:
         """Drop what this process holds."""
@@ -218,7 +213,7 @@ class Compiled(Generic[P, R]):
     def _made(self, args, kwargs, arrays, folder):
         """Return the program for such arguments: found, or exported and kept, or traced."""
         soon = {} if self._runs_long else _compiled_soon()
-        always = {**_whole_loops(), **self._asked_for} or None
+        always = _whole_loops() or None
         options = {**soon, **(always or {})} or None
         # its signature does not name what it hands on to jax.jit
         alone = eqx.filter_jit(self._function, compiler_options=options)  # pyright: ignore

@@ -1,4 +1,4 @@
-"""Pages on data: what was read, linear tests side by side, shifted curves."""
+"""The page on data: what was read, and linear tests side by side."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,7 +7,6 @@ import numpy as np
 
 from discover.dataset.checking.runs import Finding
 from discover.dataset.dataset import Dataset
-from discover.dataset.linear.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
@@ -15,8 +14,7 @@ from discover.dataset.run_table import material_and_temperature, run_line
 from discover.dataset.tables.table import toml_string
 from discover.errors import InputError
 from discover.report.page import attempt, render
-from discover.report.plots.data import data_pictures, linear_function, superposition_pictures
-from discover.report.wording import percent
+from discover.report.plots.data import data_pictures, linear_function
 from discover.words import counted, significant
 
 # From so many runs on one can be spared as a test
@@ -102,106 +100,3 @@ def first_study(dataset: Dataset, folder: str) -> str:
         lines += ['modulus_Pa = "fit"', 'relaxation_time_s = "fit"']
     lines += ["", "[loop]", "max_effects = 3"]
     return "\n".join(lines) + "\n"
-
-
-_DESCRIBES = 0.1
-"""Decades of a_T, root mean square, by which a law may miss the shifts and still describe them."""
-
-_UNKNOWN = 0.3
-"""Standard error in decades from which on a shift factor is said not to be determined: 95 % would
-span a factor of four either way."""
-
-_SYMBOLS = {"C1": ("C1", ""), "C2_K": ("C2", "K"), "activation_energy_J_mol": ("E", "J/mol")}
-
-
-def superposition_words(found: Superposition) -> list[str]:
-    """Return what can be said of a superposition, a sentence each."""
-    said = [_verdict(found)]
-    if found.verdict == "not_superposed":
-        return said
-    open_ = [
-        f"{found.celsius[i]:g}" for i in np.flatnonzero(np.max(found.error, axis=1) > _UNKNOWN)
-    ]
-    if open_:
-        said.append(
-            f"At {', '.join(open_)} °C these data do not determine the shift factors: where the "
-            "curves overlap they are straight lines, which slide along themselves."
-        )
-    return [*said, *(_law_words(law, found) for law in found.laws)]
-
-
-def _verdict(found: Superposition) -> str:
-    if not found.misfits:  # shifts that nothing determines may leave no overlap
-        return (
-            "Whether the sweeps superpose is doubtful: moved by the shifts found, those of "
-            "neighbouring temperatures do not overlap."
-        )
-    (cold, warm), size = max(found.misfits.items(), key=lambda item: item[1])
-    worst, where = percent(size), f"{cold:g} and {warm:g} °C"
-    if found.verdict == "superposed":
-        return f"The sweeps superpose: the worst overlap, of {where}, is off by {worst}."
-    if found.verdict == "doubtful":
-        return (
-            f"Whether the sweeps superpose is doubtful: those at {where} are off by {worst} where "
-            f"they overlap, more than two loadings of one sample usually are "
-            f"({percent(SUPERPOSED)})."
-        )
-    return (
-        f"The sweeps do not superpose: those at {where} are off by {worst} where they overlap "
-        f"({percent(FAILED)} or more). No single sweep stands for them; leave temperatures out "
-        "with --between, or allow a shift of the moduli with --vertical."
-    )
-
-
-def _law_words(law: ShiftLaw, found: Superposition) -> str:
-    if law.error > _DESCRIBES:
-        return (
-            f"{law.name} does not describe the shifts: off by {law.error:.2g} decades (root mean "
-            "square)."
-        )
-    parts = []
-    for key, value in law.values.items():
-        symbol, unit = _SYMBOLS[key]
-        interval = law.intervals[key]
-        known = (
-            "not determined by these shifts"
-            if interval is None
-            else f"95 % CI {interval[0]:.4g} to {interval[1]:.4g}"
-        )
-        parts.append(f"{symbol} = {f'{value:.4g} {unit}'.strip()} ({known})")
-    return (
-        f"{law.name} at {found.reference:g} °C: {', '.join(parts)}; off by {law.error:.2g} "
-        "decades (root mean square)."
-    )
-
-
-def superposition_page(found: Superposition, name: str) -> str:
-    """Return the page."""
-    pictures = attempt("The pictures", lambda: superposition_pictures(found))
-    off = {cold: percent(misfit) for (cold, _), misfit in found.misfits.items()}
-    return render(
-        "superposition.html",
-        name=name,
-        words=superposition_words(found),
-        doubtful=found.verdict != "superposed",
-        pictures=pictures if isinstance(pictures, list) else [],
-        missing=None if isinstance(pictures, list) else pictures.sentence,
-        lines=[
-            {
-                "temperature": f"{degrees:g}",
-                "a": _table_factor(found, i, 0),
-                "b": _table_factor(found, i, 1),
-                "misfit": off.get(degrees, ""),
-            }
-            for i, degrees in enumerate(found.celsius.tolist())
-        ],
-    )
-
-
-def _table_factor(found: Superposition, at: int, which: int) -> str:
-    value, low, high = found.factors(at)[which]
-    if low == high:
-        return f"{value:.4g}"
-    if found.error[at, which] > _UNKNOWN:
-        return "not determined"
-    return f"{value:.4g} ({low:.4g} to {high:.4g})"

@@ -61,7 +61,7 @@ from discover.words import (
     significant,
 )
 
-_CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
+_CALCULATES = ("numpy", "scipy", "jax", "equinox", "pysindy")
 
 
 def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: str) -> dict:
@@ -452,3 +452,13 @@ def _copies(answer: Answer) -> list[Mapping[str, str]]:
                 reason = str(error)
         found.append({"name": name, "text": text, "reason": reason})
     return [*found, {"name": "JSON", "text": json_text(answer.to_json()), "reason": ""}]
+
+
+def batch_page(studies: Sequence[Any]) -> str:
+    """Return the page over a batch: how each study ended (`discover.batch.status.StudyStatus`)."""
+    return render(
+        "batch.html",
+        studies=studies,
+        failed=[study for study in studies if study.status == "failed"],
+        waiting=sum(study.status == "waiting" for study in studies),
+    )

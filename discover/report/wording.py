@@ -105,43 +105,6 @@ def _factor(text: str) -> str:
     return f"({text})" if "+" in outside or "−" in outside else text
 
 
-RULES = {
-    "evidence": "evidence",
-    "held_out": "held-out runs",
-    "one_standard_error": "one standard error",
-    "pysindy": "pysindy at its default",
-}
-"""Rules for choosing a law, as readers know them."""
-
-
-def selection_sentence(outcome: LearnerOutcome) -> str:
-    """Return whether the rules for choosing a law agree, and on what."""
-    chosen: Mapping[str, Sequence[str]] = (outcome.details.get("selectors") or {}).get("chosen", {})
-    if not chosen:
-        return ""
-    groups: dict[tuple[str, ...], list[str]] = {}
-    for rule, support in chosen.items():
-        groups.setdefault(tuple(support), []).append(RULES.get(rule, rule))
-    if len(groups) == 1:
-        return "All rules choose the same law: " + ", ".join(chosen_names(next(iter(groups)))) + "."
-    parts = [
-        f"{' and '.join(rules)}: {', '.join(chosen_names(support))}"
-        for support, rules in groups.items()
-    ]
-    return "The rules disagree. " + "; ".join(parts) + "."
-
-
-def chosen_names(support: Sequence[str]) -> list[str]:
-    """Return the terms of a support in the field's letters; of many only how many they are."""
-    if len(support) > _MOST_NAMED:
-        return [f"{len(support)} terms"]
-    return [readable(name) for name in support] or ["no term"]
-
-
-_MOST_NAMED = 8
-"""Terms that a sentence bears: a rule may choose half a library."""
-
-
 _WHAT = {
     "recorded_stress": "a function of the recorded stress alone",
     "drift": "a function of the time alone",

@@ -49,12 +49,6 @@ def write_text(path: str | Path, text: str) -> Path:
     return path
 
 
-def remove_file(path: str | Path) -> None:
-    """Remove a file, if there is one, under the conditions of `write_text`."""
-    if replaceable(Path(path)) is not None:
-        os.unlink(path)
-
-
 def replaceable(path: Path) -> os.stat_result | None:
     """Return what the system says of a file that may be replaced; None if there is none.
 

@@ -153,7 +153,6 @@ def forward_model(declared: StudyModel) -> DeclaredModel:
     options = {
         "solvent_viscosity": declared.solvent_viscosity,
         "linear_error": 0.0 if spectrum is None else spectrum.relative_error,
-        "linear_pattern": 0.0 if spectrum is None else spectrum.pattern,
         "modulus_covariance": declared.modulus_covariance,
         "effects": declared.effects,
         "by_mode": declared.by_mode,

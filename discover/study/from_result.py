@@ -3,14 +3,13 @@
 import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
-from discover.effects import KnownEffect, ModeEffect, known_effects, make_effect
+from discover.effects import KnownEffect, known_effects
 from discover.equations import Equation
 from discover.equations.files import COMPARISON, LOOP, read_json
 from discover.equations.formats.json_format import equation_from_json
@@ -115,36 +114,11 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
         )
     equation = equation_from_json(declared["law"], f"{file.name}: declared.law")
     rows = [*declared.get("effects", ()), *content["stages"]]
-    equation, rows = _with_added_modes(equation, rows, file)
     effects, of_modes = _effects(rows, file, len(equation.modulus))
     text = _text(file, "the loop's declared law", equation, effects, of_modes)
     doubt = " With them the loop did not explain its data." if unexplained else ""
     intervals = _intervals(rows, file)
     return EarlierResult(file, equation, effects, of_modes, text, intervals, doubt)
-
-
-def _with_added_modes(
-    equation: Equation, rows: list[Any], file: Path
-) -> tuple[Equation, list[Any]]:
-    """Return a law and its effects, modes among these with the law's where they have constants."""
-    with _damage(file):
-        counts = {
-            len(p["modes"]) for row in rows for p in row["parameters"].values() if p.get("degree")
-        }
-        made = [(row, make_effect(row["effect"])) for row in rows]
-        adding = [(row, effect) for row, effect in made if isinstance(effect, ModeEffect)]
-        if not adding or counts != {len(equation.modulus) + len(adding)}:
-            return equation, rows
-        pairs = [
-            effect.mode(jnp.asarray([float(p["value"]) for p in row["parameters"].values()]))
-            for row, effect in adding
-        ]
-    whole = replace(
-        equation,
-        modulus=(*equation.modulus, *(float(g) for g, _ in pairs)),
-        relaxation_time=(*equation.relaxation_time, *(float(t) for _, t in pairs)),
-    )
-    return whole, [row for row, effect in made if not isinstance(effect, ModeEffect)]
 
 
 def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
@@ -158,11 +132,6 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
     left = content.get("lack_of_fit")
     of_sparse = left.get(_SPARSE) if isinstance(left, dict) else None
     verdict = of_sparse.get("verdict") if isinstance(of_sparse, dict) else None
-    by_mode = content.get("by_mode")
-    by_mode = by_mode if isinstance(by_mode, dict) else {}
-    told = by_mode.get("verdict") == "explained" and by_mode.get("known_part") is not None
-    if verdict != "explained" and told:
-        return _of_law_by_mode(by_mode, sparse.get("effects", ()), file)
     equation = equation_from_json(sparse["law"], f"{file.name}: learners.{_SPARSE}.law")
     effects, _ = _effects(sparse.get("effects", ()), file, len(equation.modulus))
     # without a term the known part is the law, and may be more than Maxwell's
@@ -177,20 +146,6 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
     of_terms = {("", term.term): term.ci95 for term in equation.terms if term.ci95 is not None}
     intervals = of_terms | _intervals(sparse.get("effects", ()), file)
     return EarlierResult(file, equation, effects, (), text, intervals, doubt)
-
-
-def _of_law_by_mode(law: Mapping[str, Any], instrument: Any, file: Path) -> EarlierResult:
-    """Return the law with constants by mode of a comparison, which explained what no other did."""
-    equation = equation_from_json(law["known_part"], f"{file.name}: by_mode.known_part")
-    with _damage(file):
-        constants = [*law["constants"].items()]
-    added = [
-        {"effect": name, "parameters": {make_effect(name).parameters[0].name: constant}}
-        for name, constant in constants
-    ]
-    effects, of_modes = _effects([*instrument, *added], file, len(equation.modulus))
-    text = _text(file, "the law with constants by mode", equation, effects, of_modes)
-    return EarlierResult(file, equation, effects, of_modes, text, _intervals(instrument, file), "")
 
 
 def _effects(

@@ -102,11 +102,9 @@ class Compare(Section):
     """Flows on which the laws are tested where the truth is known."""
     optimizer: Literal["stlsq", "sr3", "ssr", "frols"] = "stlsq"
     """Proposes the sets of terms."""
-    selection: Literal["evidence", "held_out", "one_standard_error", "bic"] = "evidence"
-    """Chooses the number of terms."""
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
     """Most terms of a law."""
-    recipe: Literal["default", "thorough", "paper"] = "default"
+    recipe: Literal["default", "thorough"] = "default"
     """How the network is trained."""
     quick: bool = False
     """Fewer training steps, for a first look."""

@@ -51,8 +51,7 @@ def trained(monkeypatch):
     def train(learner, study, model, runs, seed=0, progress=None, library=None):
         calls.append(learner)
         law = make_law("giesekus", {"alpha": 0.2})
-        history = (np.arange(1, 3), np.array([1.0, 0.1]))
-        result = LearnerResult(learner, law, (RecoveredTerm("sigma.sigma", 0.2),), 1.0, history)
+        result = LearnerResult(learner, law, (RecoveredTerm("sigma.sigma", 0.2),), 1.0)
         return result, Fluid.dimensionless(law)
 
     monkeypatch.setattr("discover.comparison.learning.train", train)

@@ -28,8 +28,7 @@ def trained(learner, study, model, runs, seed=0, progress=None):
     mobility = 0.2 if learner == "tensor_sindy" else 0.22
     law = make_law("giesekus", {"alpha": mobility})
     term = RecoveredTerm("sigma.sigma", mobility, coefficient_penalised=0.19, ci95=(0.19, 0.21))
-    history = (np.arange(1, 3), np.array([1.0, 0.1]))
-    result = LearnerResult(learner, law, (term,), 1.5, history, {}, "fake")
+    result = LearnerResult(learner, law, (term,), 1.5, {}, "fake")
     return result, Fluid.dimensionless(law)
 
 
@@ -69,10 +68,7 @@ def test_what_was_not_measured_has_no_error():
 def test_an_outcome_comes_back_from_its_state_unchanged():
     term = RecoveredTerm("sigma.sigma", 0.22, coefficient_penalised=0.19, ci95=(0.19, 0.21))
     wave = {"sigma12": np.sin(np.arange(5.0)) / 3.0, "N1": np.array([0.1, np.nan])}
-    history = (np.arange(2), np.ones(2))
-    outcome = LearnerOutcome(
-        "tbnn_ude", (term,), 1.5, history, predictions={"test/a": wave, "test/b": None}
-    )
+    outcome = LearnerOutcome("tbnn_ude", (term,), 1.5, predictions={"test/a": wave, "test/b": None})
     again = LearnerOutcome.from_state(json.loads(json.dumps(outcome.to_state())))
     assert again.terms == outcome.terms
     assert again.predictions["test/b"] is None

@@ -163,8 +163,7 @@ DETAILS = {"rivals": [], "n_independent": 50.0}
 def trained(learner, study, model, runs, seed=0, progress=None, library=None):
     law = make_law("giesekus", {"alpha": MOBILITY})
     term = RecoveredTerm("sigma.sigma", MOBILITY, coefficient_penalised=MOBILITY, ci95=(0.29, 0.31))
-    history = (np.arange(1, 3), np.array([1.0, 0.1]))
-    result = LearnerResult(learner, law, (term,), 1.5, history, DETAILS, "fake")
+    result = LearnerResult(learner, law, (term,), 1.5, DETAILS, "fake")
     return result, Fluid(law, model.modulus, model.relaxation_time)
 
 

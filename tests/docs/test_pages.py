@@ -150,12 +150,22 @@ def test_the_readme_fits_two_screens():
     assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 100
 
 
-def test_the_page_of_all_keys_is_that_of_the_schema():
-    path = ROOT / "docs" / "study_keys.py"
-    spec = importlib.util.spec_from_file_location("study_keys", path)
+def script(name):
+    """Return a script of docs/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
+    return made
+
+
+def test_the_page_of_all_keys_is_that_of_the_schema():
+    made = script("study_keys")
     assert made.PAGE.read_text("utf-8") == made.study_page(), "run: python docs/study_keys.py"
+
+
+def test_the_page_of_effects_is_what_the_dictionary_writes():
+    made = script("effects_page")
+    assert made.PAGE.read_text("utf-8") == made.reference_page(), "run: docs/effects_page.py"
 
 
 def test_every_key_of_a_study_file_says_what_it_means():

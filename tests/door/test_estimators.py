@@ -51,7 +51,7 @@ def network(data, base):
                      TensorBasisNetwork.initialise(jax.random.key(seed), 6))
         for seed in (0, 1)
     ]  # fmt: skip
-    made = dc.TBNNUDE(base=base, n_members=2, recipe="paper")
+    made = dc.TBNNUDE(base=base, n_members=2, recipe="thorough")
     made.n_features_in_, made.members_, made.ensemble_ = 1, laws, "made by a test"
     made.law_, made.fitting_ = laws[0], laws
     made.fluid_, *_ = made.ensemble_fluids_ = [
@@ -59,9 +59,8 @@ def network(data, base):
     ]
     made.terms_ = (RecoveredTerm("sigma.sigma", 0.3, ci95=(0.2, 0.4)),)
     made.runs_, made.provenance_ = train.runs, provenance_of(train, train.runs)
-    history = (np.arange(1, 3), np.array([1.0, np.nan]))
-    details = {"recipe": "PaperRecipe", "misfit": np.float64(0.1), "members": [{"misfit": 1.0}]}
-    made.result_ = LearnerResult("tbnn_ude", laws[0], made.terms_, 1.0, history, details, "done")
+    details = {"misfit": np.float64(0.1), "members": [{"misfit": 1.0}]}
+    made.result_ = LearnerResult("tbnn_ude", laws[0], made.terms_, 1.0, details, "done")
     return made
 
 
@@ -174,7 +173,7 @@ def test_a_file_holds_no_pickle(sindy, network, tmp_path):
                 if name.endswith(".npy"):
                     np.load(io.BytesIO(file.read(name)), allow_pickle=False)
             header = json.loads(file.read("estimator.json"))
-    assert header["version"] == 1
+    assert header["version"] == 2
     assert header["fitted"]["provenance_"]["fields"]["data"] == "melt"
 
 
@@ -203,7 +202,7 @@ def header_with(**changes):
         (lambda parts: parts.update({"estimator.json": b"[1]"}), "not a complete estimator"),
         (lambda parts: parts.pop("array0.npy"), "is damaged"),
         (lambda parts: parts.update({"array0.npy": b"nonsense"}), "is damaged"),
-        (header_with(version=2), "reads the form 1"),
+        (header_with(version=1), "reads the form 2"),
         (header_with(format="other"), "not a complete estimator"),
         (header_with(learner="magic"), "of the kind 'magic'"),
         (header_with(fitted={}), "is damaged"),

@@ -34,8 +34,7 @@ def python(code, *arguments, **environment):
     return done.stdout, done.stderr
 
 
-# equinox reads once, when it is imported, what becomes of an error inside a program, and diffrax
-# imports it
+# equinox reads once, when it is imported, what becomes of an error inside a program
 FIRST_USE = f"""
 import sys, time
 begin = time.process_time()

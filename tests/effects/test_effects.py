@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -23,7 +22,6 @@ from discover.effects import (
     named_effects,
 )
 from discover.effects.kinematic import first_order_lag
-from discover.effects.reference import reference_page
 from discover.errors import InputError
 from discover.forward import data_scales
 from discover.laws import LAWS
@@ -102,9 +100,6 @@ def test_every_parameter_has_a_physical_range_and_says_where_it_comes_from(effec
         assert len(parameter.range_source) > 20
         if parameter.range_scale != "one":
             assert parameter.range_scale in data_scales([run()])
-    # an inner constant that scales nothing in its equation has no zero
-    for parameter in effect.parameters[1:]:
-        assert parameter.low > 0.0 or "low" in parameter.ends
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
@@ -292,11 +287,6 @@ def test_no_library_term_repeats_a_named_effect():
     names = {effect.name for effect in library_effects()}
     assert names.isdisjoint({"sigma.sigma", "tr(sigma)*sigma", "sigma.gammadot+gammadot.sigma"})
     assert "tr(sigma)*gammadot" in names
-
-
-def test_reference_page_in_docs_is_what_the_dictionary_writes():
-    page = Path(__file__).parents[2] / "docs" / "effects.md"
-    assert page.read_text(encoding="utf-8") == reference_page()
 
 
 @pytest.mark.parametrize(

@@ -89,10 +89,10 @@ def test_the_study_of_the_page_on_effects_runs_as_it_stands(workplace):
     assert "transducer_saturation" in considered
 
 
-def test_the_reference_prints_the_effect_too(workplace):
+def test_the_table_of_effects_has_the_effect_too(workplace):
     workplace.follow(EFFECT)
-    script = "import runpy; runpy.run_module('discover.effects.reference', run_name='__main__')"
-    assert "### `transducer_saturation`" in workplace.run(script=script).stdout
+    script = "import discover; print([*discover.effects().index])"
+    assert "'transducer_saturation'" in workplace.run(script=script).stdout
 
 
 @pytest.mark.slow

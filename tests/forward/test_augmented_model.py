@@ -83,7 +83,7 @@ def least_squares_at(model, batch, start, at):
 
     low, high = model.low[list(at)], model.high[list(at)]
     found = least_squares(
-        lambda values: batch.records.residual(model.predict(placed(values), batch)).ravel(),
+        lambda values: (model.predict(placed(values), batch) - batch.recorded).ravel(),
         start[list(at)], bounds=(low, high), x_scale="jac",
     )  # fmt: skip
     return placed(found.x)

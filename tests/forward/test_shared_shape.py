@@ -10,7 +10,7 @@ from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, TransientFlows, make_batch
 from discover.laws import Fluid, UpperConvectedMaxwell
-from discover.loop.step_instants import with_places, with_rate_steps
+from discover.loop.measured_rates import with_places, with_rate_steps
 from discover.programs.program_cache import Compiled
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate

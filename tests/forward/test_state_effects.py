@@ -272,6 +272,6 @@ def test_a_correction_for_inertia_that_is_too_large_is_found():
     (at,), batch = model.positions(name), make_batch([run])
     unit = np.eye(len(model.zero()))[at]
     found = least_squares(
-        lambda x: batch.records.residual(model.predict(model.zero() + x * unit, batch)).ravel(), 0.0
+        lambda x: (model.predict(model.zero() + x * unit, batch) - batch.recorded).ravel(), 0.0
     )
     assert found.x[0] == pytest.approx(-8.0, rel=0.05)

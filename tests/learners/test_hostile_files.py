@@ -12,7 +12,7 @@ import pytest
 import discover as dc
 
 HEADER = {
-    "format": "discover estimator", "version": 1, "learner": "tensor_sindy", "parameters": {},
+    "format": "discover estimator", "version": 2, "learner": "tensor_sindy", "parameters": {},
     "fitted": {},
 }  # fmt: skip
 

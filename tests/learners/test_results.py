@@ -19,8 +19,7 @@ def result(base=None):
         RecoveredTerm(EXPONENTIAL, 1.0, inner={"epsilon": 0.5}),
     )
     law = law_of_terms(LawTerms.of(terms), True, base)
-    history = (np.arange(1, 3), np.array([1.0, 0.1]))
-    return LearnerResult("tensor_sindy", law, terms, 1.0, history, {}, "ended <b>well</b>")
+    return LearnerResult("tensor_sindy", law, terms, 1.0, {}, "ended <b>well</b>")
 
 
 def test_the_sympy_form_is_the_extra_term():

@@ -35,7 +35,7 @@ def first(problem):
     scale = invariant_sizes(sample_states(law, problem))
     law = initial_law(jax.random.key(0), RECIPE.width, True, scale)
     law = eqx.tree_at(lambda tree: tree.network_mask, law, jnp.zeros(8).at[RATE].set(1.0))
-    return Trained(law, law, np.zeros(1), 1.0, True, "", (RATE,), (STRESS, 0))
+    return Trained(law, law, 1.0, True, "", (RATE,), (STRESS, 0))
 
 
 @pytest.fixture(scope="module")
@@ -66,10 +66,6 @@ def test_members_that_fit_disagree_where_shear_stress_does_not_decide(problem, o
     low, high = predicted.band("N1")
     # the truth acts on the stress; a law on the rate tensor has another N1 for the same σ12
     assert np.linalg.norm(high - low) > 0.02 * np.linalg.norm(high)
-    spread = ensemble.coefficient_spread(
-        [m.law for m in others], sample_states(others[0].law, problem)
-    )
-    assert {name for name, value in spread.items() if value > 0.0} == {"sigma", "gammadot"}
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,11 @@
 """A loop whose runs are loadings of their own: records by scipy, with a factor on each."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from independent import Giesekus, oscillation, start_up
 
 import discover as dc
 from discover.dataset import Dataset, Run
-from discover.dataset.run import Loading
-from discover.effects import make_effect
-from discover.forward import AugmentedModel, DeclaredModel, make_batch, names_of_loadings
 from discover.protocols import imposed_stress, oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.report.loop.tables import how_sure
@@ -151,33 +146,3 @@ def test_a_stress_that_was_imposed_has_no_loading(exact):
     data = Dataset("runs", (*data_of(exact, {}), run))
     with pytest.raises(dc.InputError, match="imposed"):
         closed(data, loading=0.03)
-
-
-def test_normal_stress_shares_the_loading_of_its_run(exact):
-    data = data_of(exact, FACTORS, normal=True)
-    runs = [run for own in data for run in (own, own.observing("N1"))]
-    runs = [replace(run, loading=Loading(0.03)) for run in runs]
-    own = make_batch(runs).records.loadings
-    assert names_of_loadings(runs) == tuple(FACTORS)
-    assert own.rows == ((0, 1), (2, 3), (4, 5), (6, 7))
-
-
-def test_residuals_hold_the_price_of_the_likeliest_factors(exact):
-    """The squares of what is left are the least over factors, each with its price."""
-    data = data_of(exact, FACTORS)
-    declared = DeclaredModel.maxwell(100.0, 1.0)
-    model = AugmentedModel(declared, [make_effect("giesekus_mobility")])
-    theta = model.zero()
-    theta[model.positions("giesekus_mobility")] = 0.25
-    batch = make_batch([replace(run, loading=Loading(0.03, noise=0.01)) for run in data])
-    plain = make_batch(list(data))
-    predicted = model.predict(theta, plain)
-    off = plain.records.residual(predicted)
-    predicted, noise = predicted * plain.weight, 0.01 / np.sqrt([[len(run)] for run in data])
-    grid = np.linspace(-0.15, 0.15, 3001)
-    left = [
-        np.min([np.sum(((o + f * p) / n) ** 2) + (f / 0.03) ** 2 for f in grid])
-        for o, p, n in zip(np.asarray(off), np.asarray(predicted), noise, strict=True)
-    ]
-    found = np.sum((batch.records.residual(model.predict(theta, batch)) / noise) ** 2, axis=1)
-    assert np.allclose(found, left, rtol=1e-4)

@@ -16,7 +16,7 @@ from independent.instruments import Instrument
 import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flows import RateSteps
-from discover.loop.step_instants import with_places, with_rate_steps
+from discover.loop.measured_rates import with_places, with_rate_steps
 from discover.report.loop.tables import loop_verdict
 
 MODULUS, TIME, MOBILITY, NOISE = 100.0, 1.0, 0.3, 0.01

@@ -16,6 +16,7 @@ from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.program import program_of
 from discover.identify.structure import with_sensitivities
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
@@ -214,6 +215,7 @@ def _named(function):
 
 
 def test_models_that_share_every_shape_have_programs_of_their_own(folder):
+    program_of.cache_clear()  # what a test before had made would write nothing here
     # jax.vmap of a method bears the method's name, whatever its object holds
     declared = DeclaredModel.maxwell(100.0, 1.0)
     times = np.linspace(0.1, 2.0, 30)

@@ -52,17 +52,13 @@ def outcome(learner, number, predicted):
         row["held_out_by_run"] = {"a": 0.01, "b": number, "c": 0.05}
     details = {
         "path": path,
-        "selectors": {"chosen": {"evidence": ["sigma.sigma"], "held_out": None or []}},
         "inclusion": {"sigma.sigma": 0.5},
         "misfit": number,
         "coefficients": {"sigma": {"mean": number, "spread": number}},
     }
     stresses = {q: np.sin(TIMES) for q in ("sigma12", "N1", "N2")} if predicted else None
     keys = ("training/a", "held_out/b")
-    loss = (np.arange(3), np.array([1.0, np.nan, np.inf]))
-    return LearnerOutcome(
-        learner, (term,), 1.0, loss, details, "ended", dict.fromkeys(keys, stresses)
-    )
+    return LearnerOutcome(learner, (term,), 1.0, details, "ended", dict.fromkeys(keys, stresses))
 
 
 def left(verdict, misfit=0.01, correlation=0.0):

@@ -46,8 +46,7 @@ def flow(kind, is_truth, measured=None):
 
 
 def comparison(flows, predictions, bands=None):
-    nothing = (np.zeros(1), np.zeros(1))
-    outcome = LearnerOutcome("tensor_sindy", (), 0.0, nothing, predictions=predictions)
+    outcome = LearnerOutcome("tensor_sindy", (), 0.0, predictions=predictions)
     return Comparison(
         name="made up",
         data_summary="",

@@ -191,61 +191,11 @@ def test_constants_by_mode_of_a_loop_are_taken_with_those_of_every_mode(tmp_path
         assert "in each mode its own giesekus mobility (alpha = 0.5) at 0.1 s to" in found.source
 
 
-def test_a_mode_that_a_loop_added_has_the_constant_that_it_found_for_it(tmp_path):
-    first, second = LAW["modes"]
-    mode = {
-        "effect": "relaxation_mode",
-        "kind": "constitutive",
-        "parameters": {
-            "G": {"value": second["modulus_Pa"], "ci95": [39.0, 41.0], "unit": "Pa"},
-            "lambda": {"value": second["relaxation_time_s"], "ci95": [0.09, 0.11], "unit": "s"},
-        },
-    }
-    law = {**LAW, "terms": [], "modes": [first]}
-    content = {
-        **LOOP,
-        "declared": {"law": law, "effects": [GAIN]},
-        "stages": [mode, MOBILITY_BY_MODE],
-    }
-    found = declared(write(tmp_path, "loop.json", content))
-    assert [known.name for known in found.effects] == ["stress_gain"]
-    times, stress = shear(found)
-    assert stress == pytest.approx(of_scipy((0.1, 0.5), times), rel=1e-5)
-    # control: with the constants the other way round it is another fluid
-    assert np.max(np.abs(stress / of_scipy((0.5, 0.1), times) - 1.0)) > 0.02
-    # and constants of more modes than the law and its effects have are damage
-    content = {**content, "stages": [mode, _OF_THREE]}
-    with pytest.raises(InputError, match="damaged"):
-        declared(write(tmp_path, "loop.json", content))
-
-
 def test_a_constant_that_is_the_same_in_all_modes_is_one_constant(tmp_path):
     alpha = {**MOBILITY_BY_MODE["parameters"]["alpha"], "degree": 0}
     stage = {**MOBILITY_BY_MODE, "parameters": {"alpha": alpha}}
     found = declared(write(tmp_path, "loop.json", {**LOOP, "stages": [stage]}))
     assert ("giesekus_mobility", (0.2,)) in [(known.name, known.values) for known in found.effects]
-
-
-def test_of_a_comparison_the_law_by_mode_is_taken_where_it_alone_explains(tmp_path):
-    sparse = {"law": LAW, "terms": [{}], "effects": [GAIN]}
-    alpha = MOBILITY_BY_MODE["parameters"]["alpha"]
-    by_mode = {
-        "verdict": "explained",
-        "constants": {"giesekus_mobility": alpha},
-        "known_part": {**LAW, "terms": []},
-    }
-    content = {**COMPARISON, "learners": {"tensor_sindy": sparse}, "by_mode": by_mode}
-    # sparse regression explains the data too, by one law for all modes
-    assert declared(write(tmp_path, "comparison.json", content)).law.as_terms() is not None
-    content = {**content, "lack_of_fit": {"tensor_sindy": {"verdict": "unexplained"}}}
-    found = declared(write(tmp_path, "comparison.json", content))
-    times, stress = shear(found)
-    assert stress == pytest.approx(of_scipy((0.1, 0.5), times), rel=1e-5)
-    assert "the law with constants by mode" in found.source
-    assert [known.name for known in found.effects] == ["stress_gain"]
-    # one that explains nothing is no law
-    content = {**content, "by_mode": {**by_mode, "verdict": "unexplained"}}
-    assert "sparse" in declared(write(tmp_path, "comparison.json", content)).source
 
 
 _BY_MODE = {"law": None, "effects": [], "by_mode": ["alpha"]}

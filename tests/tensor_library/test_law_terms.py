@@ -19,7 +19,6 @@ LIBRARY = build_library(degree=0, closed_forms=("exp", "saturating"))
 FOUND = RecoveredTerm(
     EXPONENTIAL, 0.97, {"epsilon": 0.31}, (0.9, 1.04), coefficient_penalised=0.9, latex="h",
     inner_ci95={"epsilon": (0.3, 0.32)}, inner_at_one={"epsilon": (0.3, 0.29, 0.31)},
-    ci95_given_equal_modes=(0.92, 1.02), ci95_given_declared=(0.93, 1.01),
 )  # fmt: skip
 DECLARED = LawTerm("sigma.sigma", 0.2)
 

@@ -8,9 +8,9 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from discover.dataset.checking.runs import Finding, found, is_start_up, steady_stress, stress_noise
-from discover.dataset.linear.mode_search import BEYOND, relative_moduli, solved
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
+from discover.dataset.mode_search import BEYOND, relative_moduli, solved
 from discover.dataset.run import LARGEST, Run
 from discover.statistics import HALF_BAND
 from discover.statistics.noise.noise_model import rms

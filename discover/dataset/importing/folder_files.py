@@ -91,8 +91,7 @@ def _of_temperatures(table: str, groups: list[list[Record]], at_runs: bool) -> s
     text += f"{TESTS_FILE}; "
     if at_runs:
         return f"{text}{table}.csv is that at the temperature of the runs."
-    text += f"a fit takes one of them: import again with --temperature {first}"
-    return f"{text}, or make one of all with discover data shift." if table == "lve" else f"{text}."
+    return f"{text}a fit takes one of them: import again with --temperature {first}."
 
 
 def _merged(records: Sequence[Record]) -> list[Record]:

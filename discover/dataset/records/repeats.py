@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from discover.dataset.run import LARGEST, Loading, Run
+from discover.dataset.run import LARGEST, Run
 from discover.errors import InputError
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
@@ -166,14 +166,14 @@ def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
             )
 
 
-def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | None) -> list[Run]:
-    """Return runs each of which is a loading of its own; as they are where nothing is said of it.
+def require_loadings(runs: Sequence[Run], deviation: float | None) -> None:
+    """Refuse runs that cannot each be a loading of its own; None says nothing of loadings.
 
-    `deviation`, by which loadings differ, is relative. Raises InputError if they cannot differ so,
-    or a stress was imposed, which a factor changes otherwise.
+    `deviation`, by which they differ, is relative. Raises InputError if they cannot differ so, or a
+    stress was imposed, which a factor changes otherwise.
     """
     if deviation is None:
-        return list(runs)
+        return
     if not 0.0 < deviation <= LARGEST:
         raise InputError(
             f"loading must be above 0 and at most {LARGEST:g}; got {deviation:g}. It is "
@@ -185,7 +185,6 @@ def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | N
             f"loading is a factor on a recorded stress, and the stress of the run {creep[0]!r} was "
             "imposed. Take such runs out, or leave loading out."
         )
-    return [replace(run, loading=Loading(deviation, noise)) for run in runs]
 
 
 def total_strain(run: Run) -> float:

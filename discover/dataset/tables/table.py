@@ -379,7 +379,7 @@ def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]
     except RecursionError:
         raise InputError(f"{path} is nested too deeply to be a {kind}. {example}") from None
     except ValueError as error:  # TOML's own error, or a number of thousands of digits
-        raise InputError(f"{path} is not valid TOML: {error}. Fix that line.") from None
+        raise InputError(f"{path} is not valid TOML: {error}. Correct that line.") from None
 
 
 def toml_string(text: str) -> str:

@@ -74,13 +74,6 @@ class _Signals(NamedTuple):
         return _Signals(times[:runs], rate[:runs], clock[:runs], strain[:runs], sample[:runs])
 
 
-def _takes_numpy(effect: KinematicEffect | SignalEffect) -> bool:
-    """Return whether an effect says so where its function is: one put in its place may not."""
-    name = "felt_rate" if isinstance(effect, KinematicEffect) else "recorded_stress"
-    kind = next(kind for kind in type(effect).__mro__ if name in vars(kind))
-    return vars(kind).get("takes_numpy", False)
-
-
 def _before_runs(thetas: Float[np.ndarray, "lanes p"]) -> Float[np.ndarray, "p lanes 1 1"]:
     return thetas.T[..., None, None]
 
@@ -216,7 +209,7 @@ class SideBySide(LanePredictor):
         shaping = [e for e in shaping if type(e).felt_rate is not still]
         distorting = [e for e in effects if isinstance(e, SignalEffect)]
         self._shaping, self._distorting = map(self._amplitudes, (shaping, distorting))
-        others = [e for e in (*shaping, *distorting) if not _takes_numpy(e)]
+        others = [e for e in (*shaping, *distorting) if not e.takes_numpy]
         self._only_jax = self._amplitudes(others)
 
         def recorded(theta, present, run, *signals):

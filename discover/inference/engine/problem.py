@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.effects import AbstractEffect, EffectParameter, RadialAverage, make_effect
+from discover.effects import AbstractEffect, EffectParameter, make_effect
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.forward.declared import LARGEST
-from discover.forward.records import data_scales
+from discover.forward.scales import data_scales
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import TORQUE, Rows, transducer_of
 from discover.inference.engine.variables import SLIP_CURVE
@@ -63,10 +63,6 @@ SOUND_GAIN = 0.01
 SOUND_CLOCK = 0.01
 """Relative deviation of relaxation times: temperature is held to 0.1 to 0.2 K, and a melt's times
 change by 5 % in 1 K (Ferry 1980, ch. 11)."""
-
-SOUND_EDGE = 0.05
-"""Deviation of the torque between plates from that of a sample that ends at the rim: its radius is
-known to 1 to 2 %, and the torque goes as the third power   [Macosko 1994, ch. 5]."""
 
 BY_MODE = (1.0, 0.5)
 """Standard deviations of slope and curvature over a decade of relaxation time, by which a constant
@@ -220,8 +216,9 @@ class Problem:
         """Return the prior of the amplitude of an effect that is there."""
         at, model = self.model.positions(name)[0], self.model
         ends = float(model.low[at]), float(model.high[at])
-        if isinstance(self.effects[name], RadialAverage):  # the torque is corrected or it is not
-            return Prior("normal", 1.0, SOUND_EDGE, *ends)
+        sound = self.effects[name].parameters[0].sound
+        if sound is not None:
+            return Prior("normal", *sound, *ends)
         return Prior("amplitude", 0.0, self._widths[name], *ends)
 
     def _inner(self, position: int, parameter: EffectParameter) -> Prior:

@@ -105,8 +105,6 @@ _RANGE_SOURCE = {
     "puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1"
 }
 
-_CONTAINS = {"ucm": {"epsilon": 0.0}}
-
 
 class FenePeterlin(AbstractConstitutiveLaw):
     """FENE-P law [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
@@ -173,7 +171,6 @@ NAMED = {
         {"xi": "Johnson & Segalman 1977: from the upper (0) to the lower (2) convected derivative"},
         source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
         written=lambda: IsotropicFunction({"sigma.gammadot+gammadot.sigma": scalars("xi") / 2}),
-        contains={"ucm": {"xi": 0.0}},
     ),
     "giesekus": NamedLaw(
         "Giesekus",
@@ -182,7 +179,6 @@ NAMED = {
         {"alpha": "Giesekus 1982: a mobility that no stress can make negative"},
         source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
         written=lambda: IsotropicFunction({"sigma.sigma": scalars("alpha")}),
-        contains={"ucm": {"alpha": 0.0}},
     ),
     "ptt_linear": NamedLaw(
         "linear PTT",
@@ -191,7 +187,6 @@ NAMED = {
         _RANGE_SOURCE,
         source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
         written=_written_linear,
-        contains=_CONTAINS,
     ),
     "ptt_exponential": NamedLaw(
         "exponential PTT",
@@ -200,7 +195,6 @@ NAMED = {
         _RANGE_SOURCE,
         source="Phan-Thien 1978, J. Rheol. 22, 259",
         written=_written_exponential,
-        contains=_CONTAINS,
     ),
     "fene_p": NamedLaw(
         "FENE-P",
@@ -212,6 +206,5 @@ NAMED = {
         },
         source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
         written=_written_fene_p,
-        contains={"ucm": {"L2": 1e6}},
     ),
 }

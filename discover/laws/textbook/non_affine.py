@@ -51,10 +51,6 @@ def _with_slip(name: str, named: NamedLaw) -> NamedLaw:
         {**named.range_sources, **slip.range_sources},
         source=f"{named.source}; {slip.source}",
         written=written,
-        contains={
-            name: dict.fromkeys(slip.parameters, 0.0),
-            "johnson_segalman": dict.fromkeys(named.parameters, 0.0),
-        },
     )
 
 

@@ -224,7 +224,6 @@ NAMED = {
         },
         source="Kabanemi & Hétu 2009, J. Non-Newtonian Fluid Mech. 160, 113",
         written=_written_finite,
-        contains={"rolie_poly": {"maximum_stretch": 100.0}},
     ),
     "rolie_poly_blend": NamedLaw(
         "Rolie–Poly blend of two lengths",
@@ -246,12 +245,5 @@ NAMED = {
         },
         source="Boudara, Peterson, Leal & Read 2019, J. Rheol. 63, 71",
         is_one_mode=False,
-        contains={
-            "rolie_poly": {
-                "long_fraction": 1.0,
-                "short_time_ratio": 1.0,
-                "short_stretch_time_ratio": 1.0,
-            }
-        },
     ),
 }

@@ -73,7 +73,6 @@ NAMED = {
         },
         source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
         written=_written_saramito,
-        contains={"ucm": {"yield_strain": 0.0}},
     ),
     "white_metzner": NamedLaw(
         "White–Metzner",

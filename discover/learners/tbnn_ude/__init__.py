@@ -2,6 +2,5 @@
 
 from discover.learners.tbnn_ude.estimator import TBNNUDE
 from discover.learners.tbnn_ude.problem import DefaultRecipe
-from discover.learners.tbnn_ude.recipes import PaperRecipe
 
-__all__ = ["TBNNUDE", "DefaultRecipe", "PaperRecipe"]
+__all__ = ["TBNNUDE", "DefaultRecipe"]

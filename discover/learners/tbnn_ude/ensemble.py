@@ -16,13 +16,12 @@ from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
-from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit
+from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
 from discover.learners.tbnn_ude.recipes import train_along, train_constants
 from discover.learners.tbnn_ude.session import Progress
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.solve import SimulationError, observe
-from tensor_library.algebra import TENSOR_NAMES
 
 FITS = 1.25
 """A member whose misfit is so many times the least is no explanation of the data.
@@ -152,10 +151,3 @@ def member_predictions(
         except SimulationError:
             continue  # that it diverged is the answer
     return MemberPredictions(np.asarray(times, dtype=float), *rows)
-
-
-def coefficient_spread(members: Sequence[TensorBasisNetwork], cloud: Cloud) -> dict[str, float]:
-    """Return, by tensor, the standard deviation of gₙ over members, rms over states of training."""
-    values = np.stack([np.asarray(cloud.coefficients(member)) for member in members])
-    rms = np.sqrt(np.mean(np.var(values, axis=0), axis=0))
-    return dict(zip(TENSOR_NAMES, map(float, rms), strict=True))

@@ -7,19 +7,59 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
-from discover.forward import Records
-from discover.forward.flow_batch import FlowBatch
-from discover.forward.fluids import observed_on_grid
+from discover.forward.flow_batch import FlowBatch, lay_out
+from discover.forward.of_fluids import pieces_in_time
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, UpperConvectedMaxwell
-from discover.learners.runs import laid_out
 from discover.programs import on_device
 from discover.statistics.noise.noise_model import rms
 
 STRAIN_STEP = 0.2
 """Largest strain of a step of the integration."""
+
+
+class Records(eqx.Module):
+    """What was recorded in runs, and what every value weighs.
+
+    A value weighs one over its size (`Run.sizes`) and over the roots of the numbers of samples and
+    of runs, so that squares add up to a mean squared relative misfit. `recorded`: in Pa, of creep
+    the strain. `weight`: zero at padding, and where nothing is looked at.
+    """
+
+    recorded: Float[Array, "runs n"]
+    weight: Float[Array, "runs n"]
+
+    @classmethod
+    def of(cls, runs: Sequence[Run]) -> "Records":
+        """Return what was recorded in runs."""
+        recorded, weight = np.zeros((2, len(runs), max(map(len, runs))))
+        for i, run in enumerate(runs):
+            n = len(run)
+            recorded[i, :n] = run.recorded
+            weight[i, :n] = 1.0 / (run.sizes(run.recorded) * np.sqrt(n * len(runs)))
+        return cls(on_device(recorded), on_device(weight))
+
+    @property
+    def seen(self) -> Bool[np.ndarray, "runs n"]:
+        """Whether a value was recorded and is looked at."""
+        return np.asarray(self.weight) > 0
+
+    def only(self, keep: Bool[np.ndarray, " runs"]) -> "Records":
+        """Return the records of which only some runs are looked at."""
+        return Records(self.recorded, on_device(np.where(keep[:, None], self.weight, 0.0)))
+
+    def residual(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
+        """Return predictions minus records, weighted; zero where none is looked at."""
+        return jnp.where(self.weight > 0, self.weight * (predicted - self.recorded), 0.0)
+
+    def linearised(
+        self, predicted: Float[Array, "runs n"], columns: Float[Array, "runs n p"]
+    ) -> tuple[Float[Array, "runs n"], Float[Array, "runs n p"]]:
+        """Return the residual and its derivatives, of predictions and theirs."""
+        weight = self.weight[..., None]
+        return self.residual(predicted), jnp.where(weight > 0, weight * columns, 0.0)
 
 
 class TrainingProblem(eqx.Module):
@@ -30,7 +70,7 @@ class TrainingProblem(eqx.Module):
     """
 
     flows: FlowBatch  # the runs, on fixed time grids
-    records: Records  # what was recorded, of one kind
+    records: Records
     stress: Float[Array, " runs"]
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
@@ -39,30 +79,6 @@ class TrainingProblem(eqx.Module):
     def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
         """Return the fluid of a trial law."""
         return Fluid(law, self.modulus, self.relaxation_time, self.solvent_viscosity)
-
-    def predicted(
-        self, law: AbstractConstitutiveLaw, adjoint: Any = None
-    ) -> Float[Array, "runs n"]:
-        """Return what is recorded of a trial law."""
-        fluid = self.fluid(law)
-        return self.flows.over(
-            lambda protocol, grid: observed_on_grid(fluid, protocol, grid, adjoint)[:, 0]
-        )
-
-    def mean_squared_errors(self, law: AbstractConstitutiveLaw) -> Float[Array, " runs"]:
-        """Return the mean squared error of each run, of stresses over the sum of the moduli.
-
-        In reverse mode with recursive checkpoints at half the cost of storing every step and a
-        ninth of the continuous adjoint (51, 94 and 481 ms for the paper's network).
-        """
-        import diffrax  # a second, of which no other recipe has any use
-
-        in_reverse = diffrax.RecursiveCheckpointAdjoint()
-        weight, total = self.records.weight, jnp.sum(self.modulus)
-        unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))
-        scale = jnp.where(weight > 0, weight * unit[:, None], 1.0)
-        errors = self.records.residual(self.predicted(law, in_reverse)) / scale
-        return jnp.sum(errors**2, axis=1) / jnp.sum(weight > 0, axis=1)
 
 
 def make_problem(
@@ -80,12 +96,18 @@ def make_problem(
     """
     law = UpperConvectedMaxwell(known_relaxation) if base is None else base
     known = Fluid(law, modulus, relaxation_time)
-    flows, records = laid_out(runs, known, mean="runs", strain_step=strain_step, **limits)
+    flows = lay_out(
+        [run.protocol for run in runs],
+        [run.time for run in runs],
+        relaxation_time=known.settling_time,
+        pieces=pieces_in_time(known, runs, strain_step),
+        strain_step=strain_step,
+        **limits,
+    )
     own = [run.recorded if run.quantity in ("N1", "N2") else run.stress for run in runs]
     return TrainingProblem(
         flows,
-        # what was recorded beside σ12 is not learned
-        records.of_one_kind(),
+        Records.of(runs),
         on_device(np.array([rms(stress) for stress in own])),
         on_device(modulus),
         on_device(relaxation_time),
@@ -128,7 +150,6 @@ class Trained:
 
     law: TensorBasisNetwork  # after the polish without prior
     penalised_law: TensorBasisNetwork  # as the prior left it
-    misfits: Float[np.ndarray, " m"]  # norm of all residuals after each step
     misfit: float  # relative misfit to the data at the end
     varies: bool  # whether the network part was needed
     message: str  # how the training ended

@@ -16,10 +16,14 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from discover.forward.fluids import at_samples, dynamics_of_fluid, solved_on_grid
+from discover.forward.fluids import (
+    at_samples,
+    dynamics_of_fluid,
+    solved_on_grid,
+    with_cheap_tangents,
+)
 from discover.forward.steady_states import steady_state
 from discover.forward.stepping import follow
-from discover.forward.tangents import with_cheap_tangents
 from discover.laws.each_mode import over_modes
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem

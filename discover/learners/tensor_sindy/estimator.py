@@ -9,7 +9,6 @@ from jaxtyping import Float
 from pysindy.optimizers import BaseOptimizer
 
 from discover.dataset.run import Run
-from discover.errors import InputError
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.left_out import left_out
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion
@@ -21,16 +20,11 @@ from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.search import (
     SupportSearch,
-    choose_by_held_out,
-    choose_by_one_standard_error,
     library_problem,
 )
 from discover.programs import on_device
 from discover.progress import Progress, by_lines
 from tensor_library.library import TermLibrary
-
-SELECTIONS = ("evidence", "held_out", "one_standard_error", "bic")
-"""Rules for choosing a law; `bic` is the former name of `evidence`, which it approximates."""
 
 _ROUNDS = 8
 """Lines of text that a search is expected to say."""
@@ -43,8 +37,8 @@ class TensorSINDy(RunPrediction):
     The normal stresses are integrated, never observed. Along a trial law's trajectory the data
     give a linear sparse problem for the coefficients; a pysindy optimiser proposes supports, each
     is fitted to the integrated trajectories and weighed by its evidence, and forward, backward and
-    exchange moves go on from the likeliest until none helps. Evidence or runs left out choose among
-    the sizes; among supports that no observation distinguishes, the simplest.
+    exchange moves go on from the likeliest until none helps. Of supports that no observation
+    distinguishes the simplest is taken.
 
     Parameters
     ----------
@@ -71,10 +65,6 @@ class TensorSINDy(RunPrediction):
         Taken as every learner takes it; nothing here is random.
     use_normal_stresses
         Whether N1 and N2, where measured, join as records of their own.
-    selection
-        ``"evidence"``, the likeliest law; ``"held_out"``, a test on runs left out; or
-        ``"one_standard_error"``, the simplest law within one standard error of the best on runs
-        left out.
     max_terms
         Largest support.
     progress
@@ -127,7 +117,6 @@ class TensorSINDy(RunPrediction):
     known_relaxation: bool = True
     base_law: AbstractConstitutiveLaw | None = None
     use_normal_stresses: bool = False
-    selection: str = "evidence"
     max_terms: int = 5
     progress: Progress | None = None
     base: Fluid | None = None
@@ -137,23 +126,14 @@ class TensorSINDy(RunPrediction):
     def _learn(self, runs: list[Run], known: KnownPart) -> None:
         started = time.perf_counter()
         library = default_library() if self.library is None else self.library
-        if self.selection in ("held_out", "one_standard_error") and len(runs) < 2:
-            raise InputError(
-                f"selection={self.selection!r} needs at least two runs; got one. Use "
-                "selection='evidence'."
-            )
         problem = library_problem(runs, library, known, self.use_normal_stresses)
         fitter = Fitter(problem, problem.fitted)
         say = by_lines(self.progress, _ROUNDS)
         search = SupportSearch(fitter, library, self.optimizer, self.max_terms, say).run()
         path = search.path()
         held_out = left_out(fitter, path) if len(runs) > 1 else None
-        if self.selection == "held_out" and held_out is not None:
-            number = choose_by_held_out(held_out)
-        elif self.selection == "one_standard_error" and held_out is not None:
-            number = choose_by_one_standard_error(held_out)
-        else:
-            number = report.by_evidence(search, path)
+        # of equals the simplest
+        number = int(np.argmax([search.rank(fit) for fit in path]))
         chosen = path[number]
 
         self.search_ = search
@@ -171,23 +151,20 @@ class TensorSINDy(RunPrediction):
         self.fluid_ = Fluid(
             self.law_, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity
         )
-        misfits, rows = np.array(search.history), len(problem.fitted)
         misfit, covariance = fitter.misfit(chosen), self.covariance_
+        rows = len(problem.fitted)
         self.result_ = LearnerResult(
             learner="tensor_sindy",
             law=self.law_,
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
-            loss_history=(np.arange(1.0, misfits.size + 1.0), np.minimum.accumulate(misfits**2)),
             details={
                 "path": report.path_table(search, path, held_out),
                 "chosen": number,
-                "selection": self.selection,
-                "selectors": report.compare_rules(search, path, held_out, chosen),
                 "inclusion": report.inclusion(search),
                 "rivals": report.rival_table(search, chosen),
                 "covariance": None if covariance is None else covariance.tolist(),
-                "iterations": len(misfits),
+                "iterations": search.count,
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,
@@ -209,10 +186,6 @@ class TensorSINDy(RunPrediction):
 
     def _check_parameters(self) -> None:
         check_optimiser(self.optimizer)
-        if self.selection not in SELECTIONS:
-            raise InputError(
-                f"selection must be one of {', '.join(SELECTIONS)}; got {self.selection!r}."
-            )
         check_library(self.library)
 
 

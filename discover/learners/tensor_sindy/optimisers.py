@@ -71,22 +71,6 @@ def solve_sparse(
     return list(solutions.values())
 
 
-def default_support(
-    optimizer, design: Float[np.ndarray, "rows n"], target: Float[np.ndarray, " rows"]
-) -> tuple[int, ...]:
-    """Return the support that a pysindy optimiser leaves on the bare columns at its own setting."""
-    check_optimiser(optimizer)
-    made = (
-        {"stlsq": STLSQ, "sr3": SR3, "ssr": SSR, "frols": FROLS}[optimizer.lower()]()
-        if isinstance(optimizer, str)
-        else clone(optimizer)
-    )
-    for coefficients in _fitted(made, design, target, history=False):
-        if np.all(np.isfinite(coefficients)):
-            return tuple(int(i) for i in np.flatnonzero(coefficients))
-    return ()
-
-
 def _sweep(optimizer, matrix, right, max_terms):
     """Yield normalised coefficients."""
     n = matrix.shape[1]

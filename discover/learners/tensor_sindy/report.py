@@ -8,13 +8,8 @@ from jaxtyping import Float
 
 from discover.inference.engine.fits import Fit
 from discover.learners.results import RecoveredTerm
-from discover.learners.settings import ARITHMETIC
-from discover.learners.tensor_sindy.optimisers import default_support, solve_sparse
-from discover.learners.tensor_sindy.search import (
-    SupportSearch,
-    choose_by_held_out,
-    choose_by_one_standard_error,
-)
+from discover.learners.tensor_sindy.optimisers import solve_sparse
+from discover.learners.tensor_sindy.search import SupportSearch
 from discover.statistics import HALF_BAND
 from discover.statistics.noise.noise_model import rms
 
@@ -165,34 +160,6 @@ def inclusion(search: SupportSearch) -> dict[str, float]:
     }
     likely = {name: p for name, p in found.items() if p >= _SEEN}
     return dict(sorted(likely.items(), key=lambda pair: -pair[1]))
-
-
-def compare_rules(
-    search: SupportSearch,
-    path: Sequence[Fit],
-    held_out: Float[np.ndarray, "path runs"] | None,
-    chosen: Fit,
-) -> dict[str, Any]:
-    """Return what each rule chooses, as terms, and whether they agree."""
-    found = {"evidence": search.support(path[by_evidence(search, path)])}
-    if held_out is not None:
-        found["held_out"] = search.support(path[choose_by_held_out(held_out)])
-        simplest = path[choose_by_one_standard_error(held_out)]
-        found["one_standard_error"] = search.support(simplest)
-    model = search.model_at(chosen)
-    # in units of the stress, as a user of pysindy has them, and not over the noise
-    size = max(chosen.noise.common, ARITHMETIC)
-    found["pysindy"] = default_support(search.optimizer, size * model.design, size * model.target)
-    names = search.library.names
-    return {
-        "chosen": {rule: [names[i] for i in support] for rule, support in found.items()},
-        "agree": len(set(found.values())) == 1,
-    }
-
-
-def by_evidence(search: SupportSearch, path: Sequence[Fit]) -> int:
-    """Return the position of the likeliest member; of equals the simplest."""
-    return int(np.argmax([search.rank(fit) for fit in path]))
 
 
 def noise_of(fit: Fit, observations: int) -> dict[str, float]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import t as student
 
 from discover.dataset.run import Run
 from discover.effects.library_term import library_term
@@ -18,43 +17,6 @@ from discover.learners.settings import ARITHMETIC, KnownPart
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.progress import require_wanted
 from tensor_library.library import TermLibrary
-
-_LEVEL = 0.01
-
-
-def choose_by_held_out(errors: Float[np.ndarray, "path runs"]) -> int:
-    """Return the simplest member whose error in runs left out is not significantly above the best.
-
-    `errors`: relative misfit in runs that the fit did not see. A paired t-test on their logarithms
-    at 1 %; strict, as the supports were found with all runs in view.
-    """
-    floored = np.log(_floored(errors))
-    best = int(np.argmin(np.mean(floored, axis=1)))
-    count = errors.shape[1]
-    for member in range(best):
-        excess = floored[member] - floored[best]
-        spread = float(np.std(excess, ddof=1)) / np.sqrt(count)
-        if np.mean(excess) <= student.ppf(1.0 - _LEVEL, count - 1) * spread:
-            return member
-    return best
-
-
-def choose_by_one_standard_error(errors: Float[np.ndarray, "path runs"]) -> int:
-    """Return the simplest member within one standard error of the best in runs left out.
-
-    On the mean over runs of the squared error [Breiman et al. 1984, Classification and Regression
-    Trees, ch. 3.4.3]; whole runs are left out, as neighbouring samples are correlated.
-    """
-    squares = _floored(errors) ** 2
-    means = np.mean(squares, axis=1)
-    best = int(np.argmin(means))
-    error = float(np.std(squares[best], ddof=1)) / np.sqrt(errors.shape[1])
-    return int(np.flatnonzero(means <= means[best] + error)[0])
-
-
-def _floored(errors: Float[np.ndarray, "path runs"]) -> Float[np.ndarray, "path runs"]:
-    return np.maximum(np.where(np.isfinite(errors), errors, 1.0), ARITHMETIC)
-
 
 _STEP = 1e-4
 """Of the width of a prior: step of a difference."""
@@ -81,7 +43,6 @@ def library_problem(
                 "more. Leave out one of the two."
             )
         observed += [run.observing(quantity) for run in runs for quantity in run.beside]
-    loadings = [run.loading.deviation for run in runs if run.loading is not None]
     declared = DeclaredModel(
         fluid.law,
         np.asarray(fluid.modulus),
@@ -93,7 +54,6 @@ def library_problem(
         declared,
         [library_term(term) for term in library.terms],
         observed,
-        loading=max(loadings, default=0.0),
         computed=True,
     )
 
@@ -191,7 +151,7 @@ class SupportSearch(Search):
         super().__init__(fitter, min(most, len(library)), say)
         self.library, self.optimizer = library, optimizer
         self.places = {name: i for i, name in enumerate(library.names)}
-        self.history: list[float] = []
+        self.count = 0  # laws that were fitted and could be integrated
         self._models: dict[Key, LinearModel] = {}
 
     def support(self, fit: Fit) -> tuple[int, ...]:
@@ -225,7 +185,7 @@ class SupportSearch(Search):
         """Fit hypotheses side by side and keep them; of one set the likeliest."""
         require_wanted()
         fits = super().add(starts, wanted)
-        self.history += [self.fitter.misfit(fit) for fit in fits if np.isfinite(fit.log_posterior)]
+        self.count += sum(bool(np.isfinite(fit.log_posterior)) for fit in fits)
         return fits
 
     def run(self) -> "SupportSearch":

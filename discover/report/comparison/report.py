@@ -22,7 +22,6 @@ from discover.report.plots.comparison.flows import flow_picture, start_up_pictur
 from discover.report.plots.comparison.selection import (
     error_map_picture,
     high_deborah_picture,
-    loss_picture,
     selection_picture,
 )
 from discover.report.plots.style import Picture
@@ -49,8 +48,7 @@ def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn
         ("The picture of the selection", partial(selection_picture, details)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
     ]
-    loss = ("The picture of the loss", partial(loss_picture, comparison))
-    return _drawn(found), _drawn([runs, loss] if comparison.judged else [loss])
+    return _drawn(found), _drawn([runs] if comparison.judged else [])
 
 
 def _drawn(pictures: Sequence[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:

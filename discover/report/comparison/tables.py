@@ -16,10 +16,8 @@ from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
-    RULES,
     learner_as_subject,
     percent,
-    selection_sentence,
     sentence,
     terms_text,
     worst,
@@ -44,7 +42,6 @@ def selection(comparison: Comparison) -> dict[str, Any] | None:
     path = [] if sparse is None else sparse.details.get("path") or []
     if sparse is None or not path:
         return None
-    chosen = (sparse.details.get("selectors") or {}).get("chosen") or {}
     highest = max((row["log_evidence"] for row in path), default=0.0)
     rows = [
         {
@@ -54,11 +51,6 @@ def selection(comparison: Comparison) -> dict[str, Any] | None:
             "held_out": row["held_out"],
             "range": list(_by_run(row).values()),
             "behind": highest - row["log_evidence"],
-            "rules": ", ".join(
-                RULES.get(rule, str(rule))
-                for rule, support in chosen.items()
-                if support == row["support"]
-            ),
         }
         for row in path
     ]
@@ -67,7 +59,7 @@ def selection(comparison: Comparison) -> dict[str, Any] | None:
         {"title": spelled.get(name, name), "errors": [_by_run(row).get(name) for row in path]}
         for name in _by_run(path[0])
     ]
-    return {"rows": rows, "runs": runs, "sentence": selection_sentence(sparse)}
+    return {"rows": rows, "runs": runs}
 
 
 def _by_run(row: Mapping[str, Any]) -> Mapping[str, float | None]:

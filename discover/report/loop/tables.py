@@ -59,7 +59,7 @@ def loop_verdict(result: LoopResult) -> list[str]:
 
 def what_was_found(result: LoopResult) -> str:
     """Return how the declared model stands; effects and constants have a section of their own."""
-    names = several([effect_title(stage.effect) for stage in result.stages], "and")
+    names = several([effect_title(stage.effect) for stage in result.stages])
     if result.verdict == "no_signal":
         why = (
             f"{names} alone would explain them, without any fluid"
@@ -86,8 +86,8 @@ def _law_chosen(laws: Sequence[LawFit]) -> str:
     """Return which law was taken of several, and from which these runs do not tell it."""
     best, *others = laws
     alike = [LAWS[one.law].title for one in others if (one.probability or 0.0) > _ALIKE]
-    told = f"; these runs do not exclude {several(alike, 'and')}" if alike else ""
-    ends = f" ({several(list(best.at_end), 'and')} at an end of its range)" if best.at_end else ""
+    told = f"; these runs do not exclude {several(alike)}" if alike else ""
+    ends = f" ({several(best.at_end)} at an end of its range)" if best.at_end else ""
     return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
 
 

@@ -8,7 +8,6 @@ from jaxtyping import Float
 from matplotlib.ticker import EngFormatter
 
 from discover.dataset.dataset import Dataset
-from discover.dataset.linear.superposition import Superposition
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
@@ -21,7 +20,6 @@ from discover.report.plots.style import (
     Curve,
     Panel,
     Picture,
-    figure,
     label_rows,
     legend_above,
     literal,
@@ -32,7 +30,6 @@ from discover.report.plots.style import (
     runs_through_decades,
 )
 from discover.report.wording import percent
-from discover.statistics import HALF_BAND
 from discover.words import FIGURE_SYMBOLS, counted
 
 _MOST_RUNS = 24
@@ -216,67 +213,3 @@ def _over_time(runs: Sequence[Run]) -> Picture:
         panels.append(Panel([curve], {**_LOGARITHMIC, **labels}))
     caption = "Linear material functions in time, as they were read."
     return row_of_panels("over_time", caption, panels, width=5.0 * len(runs))
-
-
-_MARKERS = "os^vD<>ph*"
-_MOST_NAMED = 10
-"""Temperatures that a legend names."""
-_LINES = {"WLF": ("-", NETWORK), "Arrhenius": ("--", SPARSE)}
-
-
-def superposition_pictures(found: Superposition) -> list[Picture]:
-    """Return the pictures of a superposition."""
-    styles = {
-        celsius: {"marker": _MARKERS[i % len(_MARKERS)], **_POINTS}
-        for i, celsius in enumerate(found.celsius.tolist())
-    }
-    named = len(styles) <= _MOST_NAMED
-    overlaps = []
-    for which, (symbol, colour) in enumerate((("G′", NETWORK), ("G″", SPARSE))):
-        curves = [
-            (
-                found.moved[at].angular_frequency,
-                found.moved[at].measured[which],
-                {**style, "color": colour, "label": f"{at:g} °C" if named else ""},
-            )
-            for at, style in styles.items()
-        ]
-        labels = {"xlabel": "ω a_T (rad/s)", "ylabel": f"{symbol}/b_T (Pa)"}
-        overlaps.append(Panel(curves, {**_LOGARITHMIC, **labels}))
-    caption = f"All sweeps as at {found.reference:g} °C, a mark for each temperature."
-    overlap = row_of_panels("overlap", caption, overlaps, height=3.8, columns=5)
-    return [overlap, _van_gurp(found, styles), _shifts(found)]
-
-
-def _van_gurp(found: Superposition, styles: dict[float, dict[str, Any]]) -> Picture:
-    phases, moduli = [], []
-    for at, style in styles.items():
-        storage, loss = found.sweeps[at].measured
-        angle = np.degrees(np.arctan2(loss, storage))
-        phases.append((np.hypot(storage, loss), angle, {**style, "color": NETWORK}))
-        moduli.append((storage, loss, {**style, "color": NETWORK}))
-    left = {"xscale": "log", "xlabel": "|G*| (Pa)", "ylabel": "δ (°)"}
-    right = {**_LOGARITHMIC, "xlabel": "G′ (Pa)", "ylabel": "G″ (Pa)"}
-    return row_of_panels(
-        "van_gurp",
-        "As measured, without any shift: phase angle against complex modulus (van Gurp and Palmen "
-        "1998), and G″ against G′ (Cole and Cole). Where one curve is not the continuation of the "
-        "next, no shift in time makes them one; a shift along |G*| alone is b_T.",
-        [Panel(phases, left), Panel(moduli, right)],
-    )
-
-
-def _shifts(found: Superposition) -> Picture:
-    with figure(1, 1, width=10.0, height=3.2) as (drawing, axes):
-        panel = axes[0, 0]
-        style = {"ms": 5, "mfc": "none", "mew": 0.8, "marker": "o", "color": BEFORE}
-        half = HALF_BAND * found.error[:, 0]
-        panel.errorbar(found.celsius, found.log_shift, half, label="a_T", lw=1.0, ls="", **style)
-        dense = np.linspace(found.celsius[0], found.celsius[-1], 200)
-        for law in found.laws:
-            line, colour = _LINES[law.name]
-            values = law.log_shift(dense, found.reference)
-            panel.plot(dense, values, color=colour, ls=line, lw=1.2, label=law.name)
-        panel.set(xlabel="temperature (°C)", ylabel="log₁₀ a_T")
-        legend_above(drawing, axes)
-        return picture(drawing, "shifts", "Shift factors, with 95 %, and the laws fitted to them.")

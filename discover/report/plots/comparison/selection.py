@@ -1,4 +1,4 @@
-"""The way from the empty to the dense law, and which member each rule would take."""
+"""The way from the empty to the dense law, and errors over Wi and De."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,7 +20,6 @@ from discover.report.plots.style import (
     Panel,
     Picture,
     figure,
-    learner_style,
     legend_above,
     make_percentage,
     picture,
@@ -30,13 +29,12 @@ from discover.report.wording import percent
 from discover.words import FIGURE_SYMBOLS, readable
 
 _MOST_BARS = 8
-_RULE_STYLES = {"evidence": (SPARSE, "o", "evidence"), "held_out": (NETWORK, "s", "held-out runs")}
 
 
 def selection_picture(details: Mapping[str, Any]) -> Picture | None:
     """Return the selection path: misfits, evidence, and how probable each term is.
 
-    `details`: of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
+    `details`: of the sparse learner's result: ``path``, ``inclusion``.
     """
     path = details.get("path") or []
     if len(path) < 2:
@@ -67,21 +65,11 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
         middle.plot(sizes, np.max(evidence) - evidence, color=BEFORE, marker=".")
         middle.set_yscale("symlog", linthresh=5.0)
         middle.set_ylabel("log odds behind the likeliest")
-        supports = [row["support"] for row in path]
-        chosen = (details.get("selectors") or {}).get("chosen", {})
-        for offset, (rule, (colour, marker, label)) in enumerate(_RULE_STYLES.items()):
-            if rule in chosen and chosen[rule] in supports:
-                place = supports.index(chosen[rule])
-                left.plot(
-                    sizes[place],
-                    _percentage(path[place]["misfit"]),
-                    marker=marker,
-                    markersize=13 - 3 * offset,
-                    fillstyle="none",
-                    linestyle="none",
-                    color=colour,
-                    label=f"chosen by {label}",
-                )
+        likeliest = int(np.argmax(evidence))
+        left.plot(
+            sizes[likeliest], _percentage(path[likeliest]["misfit"]), marker="o", markersize=13,
+            fillstyle="none", linestyle="none", color=SPARSE, label="likeliest",
+        )  # fmt: skip
         for panel in (left, middle):
             panel.set_xlabel("number of terms")
             panel.set_xticks(sizes)
@@ -104,30 +92,6 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
 def _percentage(share: float | None) -> float:
     """Return a share in per cent for a logarithmic axis; NaN, a gap, where there is none."""
     return np.nan if share is None else 100.0 * max(share, 1e-9)
-
-
-def loss_picture(comparison: Comparison) -> Picture | None:
-    """Return the loss of each learner against its iterations; None where none has any."""
-    panels = []
-    for name, outcome in comparison.outcomes.items():
-        iterations, losses = outcome.loss_history
-        if not losses.size:
-            continue
-        positive = np.where(np.isfinite(losses), np.maximum(losses, 1e-30), np.nan)
-        sparse = name == "tensor_sindy"
-        settings = {
-            "yscale": "log",
-            "title": learner_title(name),
-            "xlabel": "support refitted" if sparse else "optimiser iteration",
-            "ylabel": "best squared relative misfit" if sparse else "training loss",
-        }
-        style = {"color": learner_style(name)["color"]}
-        panels.append(Panel([(iterations, positive, style)], settings))
-    caption = (
-        "Loss while learning. The sparse learner's is the best misfit so far over the supports "
-        "it refitted; the two scales are not comparable."
-    )
-    return row_of_panels("loss", caption, panels, 9.0, 2.6) if panels else None
 
 
 def third_harmonic(stress: np.ndarray) -> float:

@@ -1,9 +1,15 @@
-"""The dictionary of effects as a page: writes docs/effects.md."""
+"""The dictionary of effects as a page.
+
+``python docs/effects_page.py`` writes it; a test holds it equal to the dictionary.
+"""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from discover.effects.base import AbstractEffect, EffectParameter
 from discover.effects.registry import named_effects
+
+PAGE = Path(__file__).parent / "effects.md"
 
 _WHERE = {
     "constitutive": "Constitutive: the fluid",
@@ -26,8 +32,7 @@ def reference_page() -> str:
         "candidate too. An effect of your own is one file: see [adding an",
         "effect](adding-an-effect.md).",
         "",
-        "This page is written by `python -m discover.effects.reference > docs/effects.md`; a",
-        "test checks it against the code.",
+        "This page is written by `python docs/effects_page.py`; a test checks it against the code.",
     ]
     for kind, title in _WHERE.items():
         lines += ["", f"## {title}"]
@@ -90,4 +95,4 @@ def _range(parameter: EffectParameter) -> str:
 
 
 if __name__ == "__main__":
-    print(reference_page(), end="")
+    PAGE.write_text(reference_page(), encoding="utf-8")

@@ -1,11 +1,13 @@
-"""Rates that were read with noise: whether the fluid felt it, as its own stress says.
+"""Rates that were read: when they step, and whether the fluid felt their noise.
 
 A rate that was measured scatters because the motor does, and then the fluid feels it, or because
-its reading does. A prediction at the one where the other is true carries noise that no record has.
+its reading does: its own stress says. A prediction at the one where the other is true carries noise
+that no record has. When a rate steps between two samples these do not tell it: that is fitted.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -13,11 +15,12 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.dataset.run_table import wave_of
 from discover.effects import simplest_terms
+from discover.forward.augmented_model import AugmentedModel
 from discover.forward.declared import DeclaredModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.problem import Problem
 from discover.protocols import another_between_samples, sampled_rate
-from discover.protocols.between_samples import samples_of
+from discover.protocols.between_samples import samples_of, steps_between_samples
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.whiteness import separate_probability
 from discover.words import percent_of
@@ -54,12 +57,7 @@ def smoothed(run: Run) -> Run:
     scatter = rates - smooth
     if rms(scatter) < _LEAST * rms(rates) or separate_probability([scatter]) < _SEEMS_NOISE:
         return run
-    return replace(
-        run,
-        protocol=sampled_rate(times, smooth),
-        rate=curves(run.time) @ found,
-        rate_error=rms(scatter) / rms(smooth) / float(np.sqrt(len(times))),
-    )
+    return replace(run, protocol=sampled_rate(times, smooth), rate=curves(run.time) @ found)
 
 
 def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
@@ -91,3 +89,65 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
         f"The rates that were read scatter by {percent_of(max(scatter))} from sample to sample, "
         "which the stress does not follow: the constant rate, or the wave, in their midst is taken"
     )
+
+
+_MOST = 40
+"""Steps whose instants are fitted, at most: each costs a constant."""
+
+
+def with_rate_steps(run: Run) -> Run:
+    """Return a run that names the steps of its rate whose instants its samples do not tell."""
+    return replace(run, rate_steps=steps_between_samples(run.protocol, run.time, run.rate))
+
+
+def with_places(
+    declared: DeclaredModel, fitted: Sequence[Run], held_out: Sequence[Run]
+) -> tuple[DeclaredModel, list[Run], list[Run]]:
+    """Return the declared model and the runs with a place for the instant of each fitted step.
+
+    Of more than `_MOST` those with the largest change of strain are fitted, and a straight line
+    stands for each of the others. What else a fitted run recorded shares its instants.
+    """
+    largest: dict[tuple[str, float], float] = {}
+    for run in fitted:
+        for step in run.rate_steps:
+            if step.start < run.time[-1]:
+                size = abs(step.change) * (step.end - step.start)
+                largest[run.source, step.start] = size
+    kept = sorted(largest, key=lambda key: -largest[key])[:_MOST]
+    places = {key: place for place, key in enumerate(key for key in largest if key in kept)}
+
+    def placed(run: Run, is_fitted: bool) -> Run:
+        steps = (
+            replace(step, place=places.get((run.source, step.start)))
+            for step in run.rate_steps
+            if not is_fitted or (run.source, step.start) in places
+        )
+        return replace(run, rate_steps=tuple(steps))
+
+    return (
+        replace(declared, step_instants=len(places)),
+        [placed(run, True) for run in fitted],
+        [placed(run, False) for run in held_out],
+    )
+
+
+def instants_found(
+    model: AugmentedModel,
+    theta: Float[np.ndarray, " p"],
+    bounds: Mapping[int, tuple[float, float]],
+    runs: Sequence[Run],
+    held_out: Sequence[Run],
+) -> dict[str, list[dict[str, Any]]]:
+    """Return the instants as JSON-able values, by name of the run."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for run in (*runs, *held_out):
+        for step in run.rate_steps:
+            share, ci95 = step.share, None
+            if step.place is not None:
+                at = model.instants.start + step.place
+                share = float(theta[at])
+                ci95 = [step.at(end) for end in bounds[at]] if at in bounds else None
+            line = {"between_s": [step.start, step.end], "instant_s": step.at(share), "ci95": ci95}
+            found.setdefault(run.source, []).append(line)
+    return found

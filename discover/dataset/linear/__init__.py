@@ -1,1 +1,0 @@
-"""Linear sweeps: the modes that they support, and sweeps at several temperatures moved to one."""
