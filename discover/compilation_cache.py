@@ -10,10 +10,10 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-# Equinox reports errors inside a program through a call back to Python, and a program with such a
-# call cannot be kept. So, where nothing else was asked for, an error becomes NaN: every solve of
-# this library refuses what is not finite. Equinox reads this when it is first imported, which is
-# why it stands here and not in the function.
+# Diffrax and Optimistix report errors inside a program through a call back to Python, and a program
+# with such a call cannot be kept. So, where nothing else was asked for, an error becomes NaN: every
+# solve of this library reads the solver's result and refuses what is not finite. Equinox reads this
+# when it is first imported, which is why it stands here and not in the function.
 os.environ.setdefault("EQX_ON_ERROR", "nan")
 
 # What XLA starts piece by piece, in threads that wait for one another, at every step of a loop. The

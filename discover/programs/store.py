@@ -24,7 +24,7 @@ import numpy as np
 
 from discover.compilation_cache import is_ours_alone
 
-_LIBRARIES = ("jax", "jaxlib", "equinox", "numpy", "scipy")
+_LIBRARIES = ("jax", "jaxlib", "equinox", "diffrax", "optimistix", "lineax", "numpy", "scipy")
 _MAGIC = b"discover-program-1\n"
 _STAMPS_KEPT = 3
 
@@ -122,7 +122,7 @@ def load_program(file: Path) -> tuple[Any, bytes] | None:
 
 OURS = ("discover", "tensor_library")
 _VERSIONED = {
-    *OURS, "jax", "jaxlib", "equinox", "numpy", "scipy",
+    *OURS, "jax", "jaxlib", "equinox", "diffrax", "optimistix", "lineax", "numpy", "scipy",
     "builtins", "functools", "operator", "math", "collections",
 }  # fmt: skip
 """Packages whose code the stamp of the store tells apart, see `discover.programs.store`."""

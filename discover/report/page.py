@@ -61,7 +61,7 @@ from discover.words import (
     significant,
 )
 
-_CALCULATES = ("numpy", "scipy", "jax", "equinox", "pysindy")
+_CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
 
 def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: str) -> dict:

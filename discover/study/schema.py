@@ -104,7 +104,7 @@ class Compare(Section):
     """Proposes the sets of terms."""
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
     """Most terms of a law."""
-    recipe: Literal["default", "thorough"] = "default"
+    recipe: Literal["default", "thorough", "paper"] = "default"
     """How the network is trained."""
     quick: bool = False
     """Fewer training steps, for a first look."""

@@ -51,7 +51,7 @@ def network(data, base):
                      TensorBasisNetwork.initialise(jax.random.key(seed), 6))
         for seed in (0, 1)
     ]  # fmt: skip
-    made = dc.TBNNUDE(base=base, n_members=2, recipe="thorough")
+    made = dc.TBNNUDE(base=base, n_members=2, recipe="paper")
     made.n_features_in_, made.members_, made.ensemble_ = 1, laws, "made by a test"
     made.law_, made.fitting_ = laws[0], laws
     made.fluid_, *_ = made.ensemble_fluids_ = [
@@ -59,7 +59,7 @@ def network(data, base):
     ]
     made.terms_ = (RecoveredTerm("sigma.sigma", 0.3, ci95=(0.2, 0.4)),)
     made.runs_, made.provenance_ = train.runs, provenance_of(train, train.runs)
-    details = {"misfit": np.float64(0.1), "members": [{"misfit": 1.0}]}
+    details = {"recipe": "PaperRecipe", "misfit": np.float64(0.1), "members": [{"misfit": 1.0}]}
     made.result_ = LearnerResult("tbnn_ude", laws[0], made.terms_, 1.0, details, "done")
     return made
 

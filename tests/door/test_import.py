@@ -34,7 +34,8 @@ def python(code, *arguments, **environment):
     return done.stdout, done.stderr
 
 
-# equinox reads once, when it is imported, what becomes of an error inside a program
+# equinox reads once, when it is imported, what becomes of an error inside a program, and diffrax
+# imports it
 FIRST_USE = f"""
 import sys, time
 begin = time.process_time()

@@ -8,9 +8,8 @@ import pytest
 from independent.homogeneous import GiesekusFluid
 
 from discover.dataset import Run
-from discover.forward.fluids import observed_on_grid
-from discover.laws import Giesekus, TensorBasisNetwork
-from discover.learners.tbnn_ude import least_squares, recipes
+from discover.laws import Giesekus
+from discover.learners.tbnn_ude import TBNNUDE, least_squares, recipes
 from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
 from discover.learners.tbnn_ude.session import Session, initial_law, is_white
 from discover.learners.tbnn_ude.variational import Rebuild, side_by_side, states_and_jacobian
@@ -23,23 +22,6 @@ FLOWS = {
     "laos_2_1": oscillatory_shear(2.0, 1.0),
 }
 SMALL = DefaultRecipe(width=4, steps=6, polish_steps=40, max_tensors=1)
-
-
-def small_network():
-    """Return a law whose network changes little: one of full size makes some runs diverge."""
-    law = TensorBasisNetwork.initialise(jax.random.key(1), 3, 2, True)
-    return eqx.tree_at(lambda tree: tree.network.layers[-1], law, replace_fn=shrunk)
-
-
-def shrunk(layer):
-    zero = jnp.zeros_like(layer.bias)
-    return eqx.tree_at(lambda tree: (tree.weight, tree.bias), layer, (0.01 * layer.weight, zero))
-
-
-def predicted_by(law, problem):
-    """Return what is recorded of a law in the runs, without the variational equation."""
-    fluid = problem.fluid(law)
-    return problem.flows.over(lambda *flow: observed_on_grid(fluid, *flow)[:, 0])
 
 
 def problem_of(law, parameters, **options):
@@ -59,12 +41,12 @@ def trained(giesekus_problem):
 
 @pytest.mark.slow
 def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
-    law = small_network()
+    law = recipes.make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     weights = rebuild.start
     _, jacobian = states_and_jacobian(weights, rebuild, giesekus_problem)
     direction = jax.random.normal(jax.random.key(2), weights.shape)
-    predicted = eqx.filter_jit(lambda w, p: predicted_by(rebuild(w), p))
+    predicted = eqx.filter_jit(lambda w, p: p.predicted(rebuild(w)))
     step = 1e-5  # truncation of order step², rounding of order 1e-16/step
     expected = (
         predicted(weights + step * direction, giesekus_problem)
@@ -78,7 +60,7 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
-    law = small_network()
+    law = recipes.make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     whole = giesekus_problem
 
@@ -138,6 +120,7 @@ def test_the_network_is_called_in_when_constants_leave_structure():
 
 def test_the_same_key_gives_the_same_law(giesekus_problem, trained):
     again = recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
+    np.testing.assert_array_equal(again.misfits, trained.misfits)
     for one, two in zip(jax.tree.leaves(again.law), jax.tree.leaves(trained.law), strict=True):
         np.testing.assert_array_equal(one, two)
 
@@ -182,6 +165,53 @@ def test_whiteness_tells_noise_from_structure(seed, kind):
 
 
 @pytest.mark.slow
+def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem):
+    law = recipes.make_network(jax.random.key(3), 5, True)
+    active = jnp.array([True, False, True])
+    loss = float(recipes.paper_loss(law.network, law, giesekus_problem, active, 0.01))
+    problem = giesekus_problem
+    residual = np.asarray(problem.predicted(law) - problem.records.recorded)
+    weights = sum(
+        float(np.abs(w).sum())
+        for w in jax.tree.leaves(eqx.filter(law.network, eqx.is_inexact_array))
+    )
+    expected = np.mean(residual[0] ** 2) + np.mean(residual[2] ** 2) + 0.01 * weights
+    assert loss == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus_problem):
+    recipe = recipes.PaperRecipe(width=4, iterations_per_series=50, learning_rate=3e-3)
+    _, losses = recipes.train_paper(giesekus_problem, jax.random.key(0), True, recipe)
+    assert losses.shape == (150,)
+    for series in range(3):
+        assert losses[50 * series + 49] < losses[50 * series]
+    assert losses[50] > losses[49]  # the peak of a series added
+
+
+@pytest.mark.slow
+def test_the_estimator_trains_what_the_paper_s_recipe_does(giesekus_problem):
+    recipe = recipes.PaperRecipe(width=4, iterations_per_series=50)
+    data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
+    model = TBNNUDE(recipe=recipe, n_members=1, random_state=3).fit(data.runs)
+    (key,) = jax.random.split(jax.random.key(3), 1)
+    law, _ = recipes.train_paper(giesekus_problem, key, True, recipe)
+    for one, two in zip(jax.tree.leaves(model.law_), jax.tree.leaves(law), strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert model.result_.details["recipe"] == "PaperRecipe"
+
+
+@pytest.mark.slow
+def test_an_absurd_learning_rate_is_survived(giesekus_problem):
+    recipe = recipes.PaperRecipe(width=4, iterations_per_series=50, learning_rate=50.0)
+    law, losses = recipes.train_paper(giesekus_problem, jax.random.key(0), True, recipe)
+    assert not np.all(np.isfinite(losses))  # some trials did run away
+    assert all(
+        bool(jnp.all(jnp.isfinite(w))) for w in jax.tree.leaves(eqx.filter(law, eqx.is_array))
+    )
+
+
+@pytest.mark.slow
 def test_the_network_stands_on_a_known_base_law():
     data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
     problem = make_problem(data.runs, np.ones(1), np.ones(1))
@@ -218,17 +248,17 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
     problem = make_problem(runs, np.ones(1), np.ones(1))
     recorded = problem.records.recorded
     # the training grid errs by 4e-6 of the stress in shear; extension stretches faster
-    assert float(jnp.max(jnp.abs(predicted_by(Giesekus(0.3), problem) - recorded))) < 1e-4
-    law = small_network()
+    assert float(jnp.max(jnp.abs(problem.predicted(Giesekus(0.3)) - recorded))) < 1e-4
+    law = recipes.make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
     np.testing.assert_allclose(
-        along.recorded, predicted_by(rebuild(rebuild.start), problem), atol=1e-10
+        along.recorded, problem.predicted(rebuild(rebuild.start)), atol=1e-10
     )
     direction = jax.random.normal(jax.random.key(2), rebuild.start.shape)
     step = 1e-5
     ahead, behind = (
-        predicted_by(rebuild(rebuild.start + s * direction), problem) for s in (step, -step)
+        problem.predicted(rebuild(rebuild.start + s * direction)) for s in (step, -step)
     )
     expected = (ahead - behind) / (2 * step)
     np.testing.assert_allclose(

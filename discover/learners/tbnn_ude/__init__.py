@@ -2,5 +2,6 @@
 
 from discover.learners.tbnn_ude.estimator import TBNNUDE
 from discover.learners.tbnn_ude.problem import DefaultRecipe
+from discover.learners.tbnn_ude.recipes import PaperRecipe
 
-__all__ = ["TBNNUDE", "DefaultRecipe"]
+__all__ = ["TBNNUDE", "DefaultRecipe", "PaperRecipe"]

@@ -1,7 +1,9 @@
 """The scikit-learn estimator: runs in, a trained network law out."""
 
+import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import equinox as eqx
@@ -21,7 +23,7 @@ from discover.learners.runs import rough_limits, shortened_rightly, shorter_wher
 from discover.learners.settings import KnownPart, PerMode, default_library
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
-from discover.learners.tbnn_ude.least_squares import Cloud, sample_states
+from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
 from discover.learners.tbnn_ude.problem import (
     DefaultRecipe,
     Trained,
@@ -29,12 +31,12 @@ from discover.learners.tbnn_ude.problem import (
     make_problem,
 )
 from discover.learners.tbnn_ude.projection import Projection, project
-from discover.learners.tbnn_ude.recipes import train_default, work
+from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol
 from tensor_library import TENSOR_NAMES, TermLibrary
 
-RECIPES = ("default", "thorough")
+RECIPES = ("default", "thorough", "paper")
 
 
 @dataclass(eq=False, repr=False)
@@ -44,8 +46,9 @@ class TBNNUDE(RunPrediction):
     Parameters
     ----------
     recipe
-        ``"default"`` (Levenberg–Marquardt, constants first), ``"thorough"`` (the same, with nothing
-        left out where there are many modes, runs and steps), or a `DefaultRecipe`.
+        ``"default"`` (Levenberg–Marquardt, constants first; see `recipe_default`), ``"thorough"``
+        (the same, with nothing left out where there are many modes, runs and steps), ``"paper"``
+        (Adam, 7,200 iterations; see `recipe_paper`), or a `DefaultRecipe` or `PaperRecipe`.
     modulus, relaxation_time
         G in Pa and λ in s, numbers, or arrays with one value for each mode.
     known_relaxation
@@ -105,9 +108,9 @@ class TBNNUDE(RunPrediction):
 
     learner = "tbnn_ude"
     _saved = (*RunPrediction._saved, "members_", "ensemble_fluids_", "ensemble_", "fitting_")
-    _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, Provenance)
+    _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
-    recipe: str | DefaultRecipe = "default"
+    recipe: str | DefaultRecipe | PaperRecipe = "default"
     modulus: PerMode = 1.0
     relaxation_time: PerMode = 1.0
     known_relaxation: bool = True
@@ -125,25 +128,26 @@ class TBNNUDE(RunPrediction):
         recipe = self._recipe()
         whole = held = problem = _problem(runs, known)
         followed, fitted = runs, ""
-        if shorten and known.linear_relaxation:
-            followed, problem = shorter_where_it_pays(
-                runs,
-                whole,
-                lambda shorter: _problem(shorter, known),
-                known.relaxation_time,
-                recipe.affordable,
-            )
-        held = problem
-        if work(problem) > recipe.affordable:
-            problem, fitted = _rougher(problem, followed, known, recipe.samples)
-        if work(whole) > recipe.affordable:
-            recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
+        if isinstance(recipe, DefaultRecipe):
+            if shorten and known.linear_relaxation:
+                followed, problem = shorter_where_it_pays(
+                    runs,
+                    whole,
+                    lambda shorter: _problem(shorter, known),
+                    known.relaxation_time,
+                    recipe.affordable,
+                )
+            held = problem
+            if work(problem) > recipe.affordable:
+                problem, fitted = _rougher(problem, followed, known, recipe.samples)
+            if work(whole) > recipe.affordable:
+                recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
         misfits = ensemble.member_misfits(members, problem)
-        resolved, surprise = recipe.resolved, None
-        if np.min(misfits) > resolved and trained[0].varies:
+        resolved, surprise = _resolved(recipe), None
+        if isinstance(recipe, DefaultRecipe) and np.min(misfits) > resolved and trained[0].varies:
             surprise = surprises(members, problem)
         chosen, fits = ensemble.choose_member(trained, misfits, resolved, surprise)
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
@@ -172,6 +176,7 @@ class TBNNUDE(RunPrediction):
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
             details={
+                "recipe": type(recipe).__name__,
                 "misfit": best.misfit,
                 "coefficients": _coefficient_table(best.law, cloud),
                 "coefficients_vary": best.varies,
@@ -204,8 +209,8 @@ class TBNNUDE(RunPrediction):
         check_is_fitted(self, "ensemble_fluids_")
         return ensemble.member_predictions(self.ensemble_fluids_, protocol, times)
 
-    def _recipe(self) -> DefaultRecipe:
-        if isinstance(self.recipe, DefaultRecipe):
+    def _recipe(self) -> DefaultRecipe | PaperRecipe:
+        if isinstance(self.recipe, DefaultRecipe | PaperRecipe):
             return self.recipe
         if self.recipe == "default":
             recipe = DefaultRecipe()
@@ -214,18 +219,40 @@ class TBNNUDE(RunPrediction):
             return replace(recipe, width=8, steps=6, polish_steps=30, max_tensors=1, variations=())
         if self.recipe == "thorough":
             return DefaultRecipe(affordable=np.inf)
+        if self.recipe == "paper":
+            return PaperRecipe(iterations_per_series=100 if self.quick else 900)
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
     def _train_all(
-        self, problem: TrainingProblem, keys, recipe: DefaultRecipe, known: KnownPart
+        self, problem: TrainingProblem, keys, recipe, known: KnownPart
     ) -> tuple[list[Trained], str]:
         """Return all members, and how they came about."""
         say = by_steps(self.progress)
-        first = train_default(problem, keys[0], known.linear_relaxation, recipe, say, known.law)
+        first = self._train(problem, keys[0], recipe, known, say)
         if len(keys) == 1:
             return [first], "a single member"
+        if isinstance(recipe, PaperRecipe):
+            # the first has compiled the program; its steps are too small to be shared out
+            with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+                others = list(
+                    pool.map(lambda key: self._train(problem, key, recipe, known, say), keys[1:])
+                )
+            return [first, *others], "trained from initial weights of their own"
         others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
+
+    def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart, say) -> Trained:
+        relaxes = known.linear_relaxation
+        if isinstance(recipe, DefaultRecipe):
+            return train_default(problem, key, relaxes, recipe, say, known.law)
+        law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=known.law)
+        misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
+        message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
+        return Trained(law, law, misfit, True, message)
+
+
+def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
+    return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
 def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> TrainingProblem:
