@@ -172,9 +172,7 @@ def test_the_time_left_of_a_comparison_is_right_whether_it_compiles_or_not(compi
         clock,
         lambda: SLOW * crowding,
     )
-    times = ComparisonTime(
-        whole, 3, False, False, clock, lambda: SLOW * crowding, lambda: compiled
-    )
+    times = ComparisonTime(whole, 3, False, False, clock, lambda: SLOW * crowding, lambda: compiled)
     end = crowding * DEMO[compiled][-1][0]
     for at, what, *said in DEMO[compiled][:-1]:
         now = crowding * at  # the clock reads it
