@@ -84,8 +84,9 @@ def _law(answer: Any, most: int) -> str:
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     if answer.temperature_C is not None:
-        what = "times " if answer.shift_factors else ""  # the rates of use are not at this one
-        named.append(f"{what}at {degrees(answer.temperature_C)}")
+        # the rates of use are not at the one that times are reduced to
+        what = "times referred to" if answer.shift_factors else "at"
+        named.append(f"{what} {degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
 
@@ -163,7 +164,9 @@ def _corrected(answer: Any, brief: int) -> str:
     names = [effect_title(one.effect) for one in answer.suspects]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
     told = listed(names) if few else f"{len(names)} measurement errors"
-    return f"corrected for suspected {told}" if names else ""
+    # no instrument shapes what is measured in extension
+    what = "" if set(answer.range.flows) <= {"shear"} else "shear "
+    return f"{what}corrected for suspected {told}" if names else ""
 
 
 _MOST_SUSPECTS = 2
@@ -195,32 +198,34 @@ _FLOWS = {
 }
 
 
-def usable(answer: Any) -> list[str]:
-    """Return for what the law may be used: what it was fitted to and meets, or settles by itself.
+def usable(answer: Any) -> tuple[list[str], list[str]]:
+    """Return for what the law may be used: what it was fitted to and meets, and what it implies.
 
-    What the law alone says is to be as good as what is asked of the shear stress.
+    What no run tested is to be as good as what is asked of the shear stress.
     """
     flows = answer.range.flows
-    found = []
+    tested, implied = [], []
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         fitted = ("shear" if name == "sigma12" else name) in flows
         most = _USELESS if one.is_measured else answer.tolerance
         if fitted if one.inside is None else one.inside <= most:
-            found.append(symbol if one.is_measured else f"{symbol} (untested)")
-    return found + [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
+            (tested if one.is_measured else implied).append(symbol)
+    tested += [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
+    return tested, implied
 
 
 def where(answer: Any) -> str:
     """Return for what the law may be used, and in which flows; of no use, where it was fitted."""
-    place, quantities = _place(answer), usable(answer)
+    place, (quantities, implied) = _place(answer), usable(answer)
     if not place:
         return ""
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
-    only = " only" * (len(quantities) == 1)
+    only = " only" * (len(quantities) == 1 and not implied)
     use = "If that suffices, use" if answer.adequate is False else "Use"
-    return f"{use} for {listed(quantities)}{only}, {place}."
+    more = f" ({listed(implied)} if the law is right)" if implied else ""
+    return f"{use} for {listed(quantities)}{only}{more}, {place}."
 
 
 def _place(answer: Any) -> str:

@@ -19,19 +19,20 @@ class Spelled:
 def spelled_apart(effects: Iterable[AbstractEffect]) -> dict[str, Spelled]:
     r"""Return equations and letters of effects that stand together, by name of the effect.
 
-    A letter that an earlier effect has gets a prime. States come first, so that a law with them
+    A letter that an earlier effect has gets a prime, in an order of their names, so that equation
+    and table agree in whatever order they list effects. States come first, so that a law with them
     alone is spelled as it is on a page with effects of the instrument.
 
     Examples
     --------
     >>> from discover.effects import make_effect
     >>> both = map(make_effect, ("thixotropy", "thixotropic_relaxation"))
-    >>> spelled_apart(both)["thixotropic_relaxation"].symbols["build_up_time"]
+    >>> spelled_apart(both)["thixotropy"].symbols["build_up_time"]
     "t_\\mathrm{b}'"
     """
     taken: set[str] = set()
     found = {}
-    for effect in sorted(effects, key=lambda one: not isinstance(one, StateEffect)):
+    for effect in sorted(effects, key=lambda one: (not isinstance(one, StateEffect), one.name)):
         equation, symbols = effect.equation, {}
         own = {one.name: one.symbol for one in effect.parameters}
         letters = dict.fromkeys(symbol.removeprefix("1/") for symbol in own.values())

@@ -54,7 +54,7 @@ KNOWN, OPEN = ExpectedError(0.03), ExpectedError(missing="not determined", note=
         (("shear",), {"N1": KNOWN}, "σ12 and N1"),
         (("shear",), {"N1": OPEN, "N2": OPEN, "uniaxial": OPEN}, "σ12 only"),
         # what the law alone says counts where it is as good as what is asked of the shear stress
-        (("shear",), {"N1": replace(KNOWN, is_measured=False)}, "σ12 and N1 (untested)"),
+        (("shear",), {"N1": replace(KNOWN, is_measured=False)}, "σ12 (N1 if the law is right)"),
         (("shear",), {"N1": ExpectedError(0.17, is_measured=False)}, "σ12 only"),
         (
             ("shear",),
@@ -95,7 +95,7 @@ def test_shifted_runs_have_their_range_at_the_temperatures_of_the_measurement():
         MELT, temperature_C=-35.0, shift_factors={-10.0: 1.0 / 131.2},
         range=replace(MELT.range, by_temperature={-10.0: hot, -23.0: cold}),
     )  # fmt: skip
-    assert "2 modes, times at −35 °C. " in shifted.headline
+    assert "2 modes, times referred to −35 °C. " in shifted.headline
     assert "use for σ12 only, 0.01–3 1/s at −10 °C and 1–5 1/s at −23 °C." in shifted.headline
     assert shifted.use["range"]["rate_1_s"] == [0.003, 3.0]  # that of the moduli and times
     assert shifted.use["range"]["by_temperature_C"]["-10"]["rate_1_s"] == [0.01, 3.0]
