@@ -370,7 +370,8 @@ class Predictor:
         places, still = np.arange(2.0), np.zeros_like(both)
         for effect in self.program.of_force:
             values = trials.thetas[:, self.program.fluid.slices[effect.name]].T[..., *[None] * 3]
-            both = effect.recorded_stress(values, Record(places, still, both, 1.0))
+            record = Record(places, still, both, np.ones(()))
+            both = effect.recorded_stress(values, record)
         return np.concatenate([found[..., :1], both], axis=-1)
 
     def whole(

@@ -351,7 +351,7 @@ def _constants(
             _of_mode(one, name, spelled.get(name, "")),
             meaning=_of_mean_mode(one, _meaning(effect, known[name]) if name in known else ""),
             end=one.at_end if isinstance(one, StageParameter) else "",
-            over_modes=one.span if _differs(one) else None,
+            over_modes=one.span if isinstance(one, ConstantByMode) and _differs(one) else None,
         )
         for name, one in parameters.items()
     )

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from discover.effects import AbstractEffect
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.inference.engine.design import NextTests, design
@@ -48,6 +49,19 @@ _FREE = 3
 
 _FEWEST_TOLD = 0.5
 """Half width of an interval over the prior's, from which on the runs tell nothing of a mode."""
+
+
+def _at_ends(
+    effect: AbstractEffect, parameters: Mapping[str, Any], left_open: Sequence[str]
+) -> list[str]:
+    """Return what an effect is, by another name, where its inner constants may be at an end."""
+    found = []
+    for one in effect.parameters[1:]:
+        if one.absent and parameters[one.name].ci95[0] <= one.low:
+            found.append(one.absent)
+        if one.endless and one.name in left_open:
+            found.append(one.endless)
+    return found
 
 
 @dataclass(frozen=True)
@@ -183,9 +197,10 @@ class Ended(Path):
             if name in self.by_mode:
                 parameters[effect.parameters[0].name] = self.by_mode[name]
             gained = 2.0 * (search.rank(after) - search.rank(before))
+            aliases = (*self._aliases(name), *_at_ends(effect, parameters, left_open))
             found.append(
                 Stage(
-                    name, effect.kind, parameters, self._aliases(name), errors_of(self.records, i),
+                    name, effect.kind, parameters, aliases, errors_of(self.records, i),
                     float(gained), spelled[name].equation, effect.source, effect.check,
                     left_open=left_open,
                 )
