@@ -46,6 +46,8 @@ DETECTABLE, HELD_OUT_DETECTABLE = 0.5, 1.0
 """Of the noise: a miss so large raises the squared residuals by a quarter, four standard errors of
 their mean over 240 samples; of runs held out by once as much."""
 HALF_WIDTHS, BANDS = 3.0, 2.0
+RULED_OUT = 0.05
+"""Probability of a law, among those named, below which the product tells it apart from its answer."""
 FLOOR = 2e-3
 """Of the rms: what sampling of the commanded rate and text cost."""
 CONSTANT = {"sigma": "relaxation_time_s", "gammadot": "modulus_Pa"}
@@ -295,7 +297,7 @@ def of_loop(case: Case, said: dict, found: dict) -> None:
         found["false" if confident else "notes"].append(text)
     if laws := said.get("laws"):
         found["law"] = laws[0]["law"]
-        apart = {one["law"] for one in laws[1:] if one["is_told_apart"]}
+        apart = {one["law"] for one in laws[1:] if (one["probability"] or 0.0) < RULED_OUT}
         if confident and case.truth in apart:
             found["false"].append(f"{found['law']} chosen and told apart from the truth")
 

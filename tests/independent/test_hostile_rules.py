@@ -113,9 +113,9 @@ def test_a_normal_stress_that_is_determined_holds_within_two_bands(
 
 def test_a_law_that_is_told_apart_from_the_truth_is_false():
     law = replace(KNOWN, truth="giesekus")
-    laws = [{"law": "xpp", "is_told_apart": False}, {"law": "giesekus", "is_told_apart": True}]
+    laws = [{"law": "xpp", "probability": 0.97}, {"law": "giesekus", "probability": 0.02}]
     assert claim(law, "no_effect_needed", laws=laws)
-    laws[1]["is_told_apart"] = False
+    laws[1]["probability"] = 0.2
     assert not claim(law, "no_effect_needed", laws=laws)
 
 
