@@ -47,7 +47,7 @@ DETECTABLE, HELD_OUT_DETECTABLE = 0.5, 1.0
 their mean over 240 samples; of runs held out by once as much."""
 HALF_WIDTHS, BANDS = 3.0, 2.0
 RULED_OUT = 0.05
-"""Probability of a law, among those named, below which the product tells it apart from its answer."""
+"""Probability of a law among all named, below which the product tells it from its answer."""
 FLOOR = 2e-3
 """Of the rms: what sampling of the commanded rate and text cost."""
 CONSTANT = {"sigma": "relaxation_time_s", "gammadot": "modulus_Pa"}
