@@ -247,6 +247,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
             "data": self.data_summary,
             "conditions": self.conditions,
             "known_part": self.known_part,
+            "declared": posterior.declared,
             "seed": self.seed,
             "learners": learners,
             "before": {"errors": self._errors("before", self.judged)},

@@ -250,6 +250,21 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
         except InputError as error:
             return {"law": None, "law_missing": str(error)}
 
+    @property
+    def declared(self) -> dict[str, Any] | None:
+        """Declared law and effects as fitted, as result files hold them for ``[model] from``.
+
+        None of a simple material, which has no such law.
+        """
+        if self.material is not None:
+            return None
+        law = self.declared_law
+        return {
+            "law": None if law is None else equation_to_json(law),
+            "effects": self.declared_effects,
+            "by_mode": self.differing_by_mode,
+        }
+
     def to_json(self) -> dict[str, Any]:
         """Return the contents of ``loop.json``."""
         contents = {
@@ -260,11 +275,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
             "stages": self.stages,
             "remaining": self.remaining,
             "residual": dict(zip(("declared", "augmented"), self.readings, strict=True)),
-            "declared": {
-                "law": None if self.declared_law is None else equation_to_json(self.declared_law),
-                "effects": self.declared_effects,
-                "by_mode": self.differing_by_mode,
-            },
+            "declared": self.declared,
             "declared_parameters": self.declared_parameters,
             "ranking": self.rankings,
             "runs": {

@@ -18,7 +18,6 @@ from discover.laws.registry import LAWS
 from discover.study.run_folder import STATE_FILE, STATE_FOLDER
 from discover.words import counted
 
-_SPARSE = "tensor_sindy"
 _AGAIN = "Run the command that made it again with --overwrite."
 
 
@@ -33,7 +32,7 @@ class EarlierResult:
         tuple[KnownEffect, ...], ...
     ]  # values by mode of effects with constants of each
     text: str  # what was taken, in words
-    # 95 % intervals of constants, by effect, or "" of a term of the law, and name
+    # 95 % intervals of constants, by effect, or "" of the law and its modes, and name
     intervals: Mapping[tuple[str, str], tuple[float, float]]
     doubt: str  # that it did not explain its own data, in words, or empty
 
@@ -92,60 +91,53 @@ def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
             f"[model] from: the data behind {file} hold no signal, so it found nothing that "
             "could be taken. Declare the law with law and its constants."
         )
-    return _of_loop(content, file) if file.name == LOOP else _of_comparison(content, file)
+    return _found(content, file)
 
 
-def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
-    declared = content.get("declared")
-    if not isinstance(declared, dict) or not isinstance(content.get("stages"), list):
-        raise InputError(f"[model] from: {file} does not say what its loop started from. {_AGAIN}")
+def _found(content: Mapping[str, Any], file: Path) -> EarlierResult:
+    """Return the declared law and effects of a loop or a comparison, and what either added.
+
+    Both write the likeliest hypothesis of a posterior: what was declared, as fitted with it, and
+    the effects that it adds, of fluid and instrument.
+    """
+    task, found, of_added, of_constants = "loop", content, "stages", "declared_parameters"
+    if file.name == COMPARISON:
+        task, of_added, of_constants = "comparison", "effects", "constants"
+        found = content.get("posterior")
+    declared = content.get("declared", "")
+    added = found.get(of_added) if isinstance(found, Mapping) else None
+    if found is None or not isinstance(declared, dict | None) or not isinstance(added, list):
+        raise InputError(
+            f"[model] from: {file} does not say what its {task} started from. {_AGAIN}"
+        )
+    if declared is None:
+        raise InputError(
+            f"[model] from: the {task} of {file} found a material that does not relax, so there is "
+            f"no law to go on from. Its constants stand under use in {file.name}."
+        )
     if declared.get("law") is None:
         differing = ", ".join(map(str, declared.get("by_mode") or ()))
         why = f"has {differing} by mode" if differing else "is no sum of library terms"
         raise InputError(
-            f"[model] from: the law that the loop of {file} started from {why} and has no name, so "
-            "it cannot be taken from a file. Declare it with law and its constants."
+            f"[model] from: the law that the {task} of {file} started from {why} and has no name, "
+            "so it cannot be taken from a file. Declare it with law and its constants."
         )
     unexplained = content.get("verdict") == "unexplained"
-    if unexplained and not content["stages"]:
+    equation = equation_from_json(declared["law"], f"{file.name}: declared.law")
+    rows = [*declared.get("effects", ()), *added]
+    # what was declared may be more than Maxwell's law
+    if unexplained and not (rows or equation.terms or equation.named):
         raise InputError(
-            f"[model] from: the loop of {file} did not explain its data and added no effect, so "
+            f"[model] from: the {task} of {file} did not explain its data and added no effect, so "
             "there is nothing to take. Declare the law with law and its constants."
         )
-    equation = equation_from_json(declared["law"], f"{file.name}: declared.law")
-    rows = [*declared.get("effects", ()), *content["stages"]]
     effects, of_modes = _effects(rows, file, len(equation.modulus))
-    text = _text(file, "the loop's declared law", equation, effects, of_modes)
-    doubt = " With them the loop did not explain its data." if unexplained else ""
-    intervals = _intervals(rows, file)
-    return EarlierResult(file, equation, effects, of_modes, text, intervals, doubt)
-
-
-def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
-    learners = content.get("learners")
-    sparse = learners.get(_SPARSE) if isinstance(learners, dict) else None
-    if not isinstance(sparse, dict) or sparse.get("law") is None:
-        raise InputError(
-            f"[model] from: {file} holds no law of sparse regression, and a network cannot be "
-            'written out. Run the comparison with "tensor_sindy" among [compare] learners.'
-        )
-    left = content.get("lack_of_fit")
-    of_sparse = left.get(_SPARSE) if isinstance(left, dict) else None
-    verdict = of_sparse.get("verdict") if isinstance(of_sparse, dict) else None
-    equation = equation_from_json(sparse["law"], f"{file.name}: learners.{_SPARSE}.law")
-    effects, _ = _effects(sparse.get("effects", ()), file, len(equation.modulus))
-    # without a term the known part is the law, and may be more than Maxwell's
-    bare = not (sparse.get("terms") or equation.terms or equation.named or effects)
-    if verdict != "explained" and bare:
-        raise InputError(
-            f"[model] from: sparse regression found no term in {file} and its law does not explain "
-            "the data, so there is nothing to take. Declare the law with law and its constants."
-        )
-    text = _text(file, "the law of sparse regression", equation, effects)
-    doubt = "" if verdict == "explained" else " It did not explain the data that it was found in."
-    of_terms = {("", term.term): term.ci95 for term in equation.terms if term.ci95 is not None}
-    intervals = of_terms | _intervals(sparse.get("effects", ()), file)
-    return EarlierResult(file, equation, effects, (), text, intervals, doubt)
+    text = _text(file, f"the {task}'s declared law", equation, effects, of_modes)
+    doubt = f" With them the {task} did not explain its data." if unexplained else ""
+    of_law = {"effect": "", "parameters": found.get(of_constants, {})}
+    return EarlierResult(
+        file, equation, effects, of_modes, text, _intervals([of_law, *rows], file), doubt
+    )
 
 
 def _effects(
@@ -202,7 +194,7 @@ def _damage(file: Path) -> Iterator[None]:
 
 def _text(
     file: Path, law: str, equation: Equation, effects: tuple[KnownEffect, ...],
-    of_modes: tuple[tuple[KnownEffect, ...], ...] = (),
+    of_modes: tuple[tuple[KnownEffect, ...], ...],
 ) -> str:  # fmt: skip
     n, modes = len(equation.terms), len(equation.modulus)
     named = equation.named
