@@ -8,7 +8,7 @@ import numpy as np
 from discover.comparison.flows import Flow, columns_of, of_recorded, relative_errors
 from discover.comparison.known_part import Frame
 from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
-from discover.forward import make_batch
+from discover.forward import DeclaredModel, make_batch
 from discover.inference.engine.fits import Fit, Fitter
 from discover.laws import LAWS
 from discover.loop.answering import LAW_OF_EFFECT
@@ -48,7 +48,8 @@ def fit_classical_laws(
 ) -> tuple[ClassicalFit, ...]:
     """Fit the classical laws, and `further` ones, to the training runs; test them in other flows.
 
-    The declared law is set aside; modes, solvent and known effects stay.
+    The declared law is set aside, and known effects that add a term to it; modes, solvent and
+    other known effects stay.
     """
     judged = [flow for flow in frame.flows if flow.kind in ("held_out", "test")]
     best = found.posterior.fits[0][0] if found.posterior.fits else None
@@ -66,11 +67,21 @@ def fit_classical_laws(
     return tuple(_result(name, *one, judged, least) for name, one in tried.items())
 
 
+def _with(found: Found, law: str) -> DeclaredModel:
+    """Return the declared model with a named law in place of all that is a law in it."""
+    declared = found.posterior.problem.declared
+    kept = tuple(
+        known
+        for known in declared.effects
+        if not (isinstance(known.effect, ConstitutiveEffect) and known.effect.adds_term)
+    )
+    return with_law(replace(declared, by_mode=(), effects=kept), law)
+
+
 def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
     """Return the classical laws as effects added to upper convected Maxwell."""
-    declared = with_law(replace(found.posterior.problem.declared, by_mode=()), "ucm")
-    known = {effect.name for effect in (*declared.effects, *bench)}
-    names = {name for some in _AS_EFFECTS.values() for name in some} - known
+    declared = _with(found, "ucm")
+    names = {name for some in _AS_EFFECTS.values() for name in some}
     problem = found.task.problem(declared, [*map(make_effect, sorted(names)), *bench])
     fitter = Fitter(problem, problem.fitted)
     names = [effect.name for effect in bench]
@@ -92,7 +103,7 @@ def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tu
 
 def _of_law(found: Found, name: str, bench: Sequence[AbstractEffect]) -> tuple[Fitter, Fit]:
     """Return any named law in place of the declared one."""
-    declared = with_law(replace(found.posterior.problem.declared, by_mode=()), name)
+    declared = _with(found, name)
     problem = found.task.problem(declared, bench)
     fitter = Fitter(problem, problem.fitted)
     names = [effect.name for effect in bench]

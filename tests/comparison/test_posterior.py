@@ -54,13 +54,14 @@ def loaded(records, gain, folder):
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, 1.0)
 
 
-def compared(data):
+def compared(data, **options):
     with pytest.MonkeyPatch.context() as patch:
         few_candidates(patch)
         verdict_alone(patch, structure=True)
         return dc.compare(
-            data, BASE, held_out=["held.csv"], learners=["tensor_sindy"], library={"degree": 0}
-        )
+            data, BASE, held_out=["held.csv"], learners=["tensor_sindy"], library={"degree": 0},
+            **options,
+        )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -154,6 +155,23 @@ def test_control_without_a_gain_none_is_taken(records, tmp_path):
     data = loaded(records, 1.0, tmp_path)
     model = taken(compared(data), data, tmp_path)
     assert [known.name for known in model.effects] == ["giesekus_mobility"]
+
+
+def test_a_comparison_that_goes_on_finds_nothing_further_and_the_same_best_classical_law(
+    found, data, tmp_path
+):
+    known = {}
+    for (effect, name), value in values_of(taken(found, data, tmp_path)).items():
+        known.setdefault(effect, {})[name] = value
+    again = compared(data, known_effects=known)
+    assert again.verdict == "explained"
+    assert not again.posterior.stages
+    assert not again.outcomes["tensor_sindy"].terms
+    # what the mobility was declared to be is set aside with the declared law
+    fits = {fit.law: fit for fit in again.classical}
+    low, high = fits["giesekus"].ci95["alpha"]
+    assert low <= MOBILITY <= high
+    assert fits["giesekus"].misfit < 1.3 * NOISE < fits["ucm"].misfit
 
 
 def test_a_loop_of_the_same_runs_leads_to_the_same_model(found, data, tmp_path):
