@@ -177,14 +177,11 @@ class Discrepancy:
 
     def _deviations(self) -> Float[np.ndarray, "grid runs k"]:
         """Return the deviations of the curves of each run, for each curve of the grid."""
-        k, found = np.arange(_MODES), []
-        for size, stiffness, growth, after_a_step in self._grid:
-            power = 1.0 / (1.0 + (k / stiffness) ** 4)
-            # a cosine has half of the square of its size, a constant all of it
-            power /= np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
-            power = np.append(0.0 * power, power) if after_a_step else np.append(power, 0.0 * power)
-            found.append(size * power * np.exp(growth * self.growth)[:, None])
-        return np.array(found)
+        found = np.zeros((len(self._grid), len(self.growth), 2 * _MODES))
+        for own, (size, stiffness, growth, after_a_step) in zip(found, self._grid, strict=True):
+            scale = size * np.exp(growth * self.growth)[:, None]
+            own[:, _half(after_a_step)] = scale * _spectrum(stiffness)
+        return found
 
     def _noise(self, correlation: float) -> Noise:
         """Return noise of size one with a correlation."""
@@ -203,18 +200,40 @@ class Discrepancy:
                 plain.append(own.T @ own)
                 cross.append(curve.T @ own)
                 inner.append(curve.T @ curve)
-            d = self._deviations()
-            scaled = d[..., :, None] * np.array(inner) * d[..., None, :]
-            chol = np.linalg.cholesky(np.eye(width) + scaled)
-            along = np.linalg.solve(chol, d[..., None] * np.array(cross))
-            grams = np.array(plain) - np.swapaxes(along, -1, -2) @ along
-            logs = np.sum(np.log(np.diagonal(chol, axis1=-2, axis2=-1)), axis=(-1, -2))
-            total = np.sum(np.concatenate([np.array(plain)[None], grams]), axis=1)
+            grams, logs = self._without_curves(sum(plain), np.array(cross), np.array(inner))
             base = self.fitter.noise.log_determinant(self.record, noise)
             self._kept[correlation] = _Products(
-                total, base - np.append(0.0, logs), np.array(cross), np.array(inner)
+                grams, base - logs, np.array(cross), np.array(inner)
             )
         return self._kept[correlation]
+
+    def _without_curves(
+        self,
+        plain: Float[np.ndarray, "n n"],
+        cross: Float[np.ndarray, "runs k n"],
+        inner: Float[np.ndarray, "runs k k"],
+    ) -> tuple[Float[np.ndarray, "one_more n n"], Float[np.ndarray, " one_more"]]:
+        """Return products with each curve of the grid integrated out, and half log determinants.
+
+        The first is without a curve. Curves of one spectrum differ in size alone, so that one
+        decomposition S K S = Q Λ Qᵀ of each run serves all of these.
+        """
+        kinds = {}
+        for kind in {(stiffness, after) for _, stiffness, _, after in self._grid}:
+            half, spectrum = _half(kind[1]), _spectrum(kind[0])
+            scaled = spectrum[:, None] * inner[:, half, half] * spectrum
+            values, vectors = np.linalg.eigh(scaled)
+            along = np.swapaxes(vectors, 1, 2) @ (spectrum[:, None] * cross[:, half])
+            kinds[kind] = np.maximum(values, 0.0), along
+        grams, logs = [plain], [0.0]
+        for size, stiffness, growth, after_a_step in self._grid:
+            values, along = kinds[stiffness, after_a_step]
+            squares = (size * np.exp(growth * self.growth))[:, None] ** 2
+            taken = np.sqrt(squares / (1.0 + squares * values))[..., None] * along
+            taken = taken.reshape(-1, len(plain))
+            grams.append(plain - taken.T @ taken)
+            logs.append(0.5 * float(np.sum(np.log1p(squares * values))))
+        return np.array(grams), np.array(logs)
 
     @property
     def sizes_of_noise(self) -> Float[np.ndarray, " runs"]:
@@ -340,6 +359,19 @@ def _posterior(
     mean[used] = own * (inverse @ (inverse.T @ (own * gram[1:, 0][used])))
     root[used] = own[:, None] * inverse
     return mean, root
+
+
+def _half(after_a_step: bool) -> slice:
+    """Return which of all curves run along the samples, or after the steps of the rate."""
+    return slice(_MODES, None) if after_a_step else slice(_MODES)
+
+
+def _spectrum(stiffness: float) -> Float[np.ndarray, " k"]:
+    """Return the deviations of cosines whose sum has a root mean square of one."""
+    k = np.arange(_MODES)
+    power = 1.0 / (1.0 + (k / stiffness) ** 4)
+    # a cosine has half of the square of its size, a constant all of it
+    return power / np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
 
 
 def _cosines(rows: Rows) -> Float[np.ndarray, "rows curves"]:
