@@ -103,6 +103,7 @@ class _Runs(NamedTuple):
     rate: np.ndarray
     tool_rate: np.ndarray
     in_shear: bool
+    lines: tuple[np.ndarray, np.ndarray]  # from samples to step ends, see `_lines`
 
 
 def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -138,17 +139,33 @@ def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return held, whole, least
 
 
-def _between(
-    values: Float[np.ndarray, "runs n lanes"], part: TransientFlows
-) -> Float[np.ndarray, "runs s lanes"]:
-    """Return values at samples as straight lines between these, at all step ends."""
-    times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
-    return np.array(
-        [
-            np.stack([np.interp(own, own[at], one) for one in of_run.T], axis=-1)
-            for of_run, own, at in zip(values, times, sample, strict=False)
-        ]
+def _lines(
+    times: Float[np.ndarray, "runs s"], sample: np.ndarray
+) -> tuple[np.ndarray, Float[np.ndarray, "runs s 1"]]:
+    """Return between which samples step ends are, and what share of the way, shapes (runs, s, 1).
+
+    Samples behind the last of a shorter run are copies of it.
+    """
+    at_samples = np.take_along_axis(times, sample, axis=1)
+    pairs = zip(at_samples, times, strict=True)
+    before = np.array([np.searchsorted(own, all_, side="right") - 1 for own, all_ in pairs])
+    before = np.clip(before, 0, max(sample.shape[1] - 2, 0))
+    first, second = (
+        np.take_along_axis(at_samples, np.minimum(before + i, sample.shape[1] - 1), axis=1)
+        for i in (0, 1)
     )
+    width = second - first
+    share = np.where(width > 0.0, (times - first) / np.where(width > 0.0, width, 1.0), 0.0)
+    return before[..., None], np.clip(share, 0.0, 1.0)[..., None]
+
+
+def _between(
+    values: Float[np.ndarray, "runs n lanes"], before: np.ndarray, share: np.ndarray
+) -> Float[np.ndarray, "runs s lanes"]:
+    """Return values at samples as straight lines between these, at all step ends; see `_lines`."""
+    first = np.take_along_axis(values, before, axis=1)
+    behind = np.minimum(before + 1, values.shape[1] - 1)
+    return first + share * (np.take_along_axis(values, behind, axis=1) - first)
 
 
 def _runs(part: TransientFlows) -> _Runs:
@@ -178,6 +195,7 @@ def _runs(part: TransientFlows) -> _Runs:
         rate,
         tool_rate,
         flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
+        _lines(times, np.asarray(part.sample_index)),
     )
 
 
@@ -268,7 +286,8 @@ class SideBySide(LanePredictor):
             # what alters a signal looks beyond its samples, at all steps of the grid
             given["held"] = np.ones_like(laid_out.held)
             stress, felt, *_ = self._code(runs, declared, used, given)
-            stress[:runs] += _between(at_samples - stress[places], part)
+            before, share = (of[:runs] for of in laid_out.lines)
+            stress[:runs] += _between(at_samples - stress[places], before, share)
         beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
         felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
         signals = laid_out.signals.of_first(runs)
