@@ -204,21 +204,23 @@ def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None =
 
 
 @in_one_thread
-def posterior_of(search: Search) -> Posterior:
-    """Return the posterior over hypotheses that were fitted, wherever they come from."""
+def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
+    """Return the posterior over hypotheses that were fitted, wherever they come from.
+
+    `before`: the posterior of the same search before others were added, of which is kept what these
+    do not change.
+    """
+    done = {} if before is None else before.memory
     problem, alive = search.problem, search.alive()
     best = search.rank(alive[0]) if alive else 0.0
     near = [fit for fit in alive if search.rank(fit) > best - WINDOW][:_MOST]
     whole, judged = search, near
     if problem.predicted is not None:
-        every = Rows.of([*problem.fitted.runs, *problem.predicted.runs])
-        whole = refitted([*near, search.found[frozenset()]], Fitter(problem, every))
-        whole.backwards().exchange()
+        whole = _of_all_runs(search, near, done["whole"][0] if done else None)
         judged = whole.alive()
     logs = np.array([whole.rank(fit) for fit in judged])
-    beside = [
-        Discrepancy(whole.fitter, fit, smallest(whole, fit)) for fit in judged[:_WITH_DISCREPANCY]
-    ]
+    known = [*done["whole"][2], *([before.left] if before.left else [])] if before else []
+    beside = [_left_by(whole, fit, known) for fit in judged[:_WITH_DISCREPANCY]]
     nothing = [whole.rank(one.fit) + one.log_factor + np.log(NONE / (1.0 - NONE)) for one in beside]
     total = float(np.logaddexp.reduce([*logs, *nothing]))
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
@@ -232,7 +234,7 @@ def posterior_of(search: Search) -> Posterior:
     found.memory["whole"] = whole, judged, beside
     if not near:
         return found
-    found.left = left = Discrepancy(search.fitter, near[0], smallest(search, near[0]))
+    found.left = left = _left_by(search, near[0], known)
     none = own[0] + left.log_factor + np.log(NONE / (1.0 - NONE))
     enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > NEGLIGIBLE
     # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is
@@ -240,8 +242,30 @@ def posterior_of(search: Search) -> Posterior:
         found.by_left_out = _foretelling(found)
         fit = found.relied_on[0][0]
         if fit is not near[0]:
-            found.left = Discrepancy(search.fitter, fit, smallest(search, fit))
+            found.left = _left_by(search, fit, known)
     return found
+
+
+def _of_all_runs(search: Search, fits: Sequence[Fit], done: Search | None) -> Search:
+    """Return hypotheses fitted to all runs, those to predict too, beside what was done before."""
+    problem, wanted = search.problem, [*fits, search.found[frozenset()]]
+    if done is None:
+        every = Rows.of([*problem.fitted.runs, *problem.predicted.runs])
+        done = refitted(wanted, Fitter(problem, every))
+    else:
+        new = [fit for fit in wanted if frozenset(fit.names) not in done.found]
+        if not new:
+            return done
+        done.add([done.fitter.start(fit.names, fit.theta) for fit in new])
+    done.backwards().exchange()
+    return done
+
+
+def _left_by(search: Search, fit: Fit, known: Sequence[Discrepancy]) -> Discrepancy:
+    """Return what a hypothesis leaves; one that is known if nothing has changed."""
+    least = smallest(search, fit)
+    same = (one for one in known if one.fit is fit and one.smallest == least)
+    return next(same, None) or Discrepancy(search.fitter, fit, least)
 
 
 def _foretelling(posterior: Posterior) -> tuple[tuple[Fit, float], ...]:
