@@ -49,10 +49,12 @@ from discover.errors import InputError
 from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
-from discover.report.wording import percent, percent_range
+from discover.report.wording import parameter_name, percent, percent_range
+from discover.statistics.noise.noise_model import rms
 from discover.words import (
     LEVEL,
     effect_title,
+    effects_title,
     estimate,
     interval,
     listed,
@@ -140,6 +142,12 @@ def _environment() -> Environment:
         safe_svg=Markup,
         as_link=_as_link,
         in_units=in_units,
+        formula=formula,
+        safe_name=safe_name,
+        parameter_name=parameter_name,
+        effect_title=effect_title,
+        effects_title=effects_title,
+        rms=rms,
     )
     return environment
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.loop import FreeForm
+from discover.loop.constants import ConstantByMode, StageParameter
 from discover.protocols.kinematics import MODULI
 from discover.words import (
     FIGURE_SYMBOLS,
@@ -16,6 +17,7 @@ from discover.words import (
     interval,
     percent_of,
     readable,
+    significant,
 )
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
@@ -103,6 +105,15 @@ def _factor(text: str) -> str:
     """Return a term as a number may stand before it: a sum in brackets, unless it has them."""
     outside = re.sub(r"\([^()]*\)", "", text)
     return f"({text})" if "+" in outside or "−" in outside else text
+
+
+def parameter_name(name: str, parameter: StageParameter) -> str:
+    """Return the name of a parameter, of one by mode in the field's letters with its mean time."""
+    if not isinstance(parameter, ConstantByMode):
+        return name
+    text = readable(name.replace("_", " ").replace("build up", "build-up"))
+    time = significant(parameter.mean_time_s, 3)
+    return f"{text} (varies from mode to mode) at λ = {time} s"
 
 
 _WHAT = {

@@ -24,6 +24,7 @@ from discover.report.plots.loop.runs import (
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.wording import SMALL_FAULTS
 from discover.study.run_folder import RunFolder
+from discover.words import FIGURE_SYMBOLS
 
 
 def write_loop(
@@ -71,19 +72,10 @@ def write_loop(
         error_rows=tables.error_rows(result),
         recorded=in_words(record.quantity for record in result.records),
         noise_range=tables.noise_range(result),
-        run_rows=tables.run_rows(result),
-        explanations=tables.explanations(result),
         inclusion=tables.inclusion(result),
-        next_tests=tables.next_tests(result),
-        stages=[
-            tables.stage_row(stage, i, result.letters.get(stage.effect, {}))
-            for i, stage in enumerate(result.stages)
-        ],
-        declared_effects=tables.declared_effects(result),
-        rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
-        folds=[tables.fold_row(fold) for fold in result.folds],
+        kinds=tables.KINDS,
+        symbols=FIGURE_SYMBOLS,
         remaining=tables.remaining_rows(result),
-        loadings=tables.loadings(result),
         small_faults=SMALL_FAULTS,
         readings=[
             (f"{name[:1].upper()}{name[1:]}", reading.sentences)

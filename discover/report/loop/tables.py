@@ -1,31 +1,19 @@
 """The tables of a closed loop's page, as rows."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from discover.laws.registry import LAWS
-from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import CandidateScore, Fold, LawFit, Stage
+from discover.loop.parts import LawFit
 from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by
 from discover.protocols.kinematics import ONLY_STATES
-from discover.report.mathtext import formula
-from discover.report.page import safe_name
 from discover.report.wording import free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
-from discover.words import (
-    FIGURE_SYMBOLS,
-    effect_title,
-    effects_title,
-    listed,
-    p_value,
-    readable,
-    significant,
-)
+from discover.words import effect_title, listed, p_value, significant
 
 KINDS = {"constitutive": "in the fluid", "kinematic": "in the flow", "signal": "in the instrument"}
 
@@ -89,15 +77,6 @@ def _law_chosen(laws: Sequence[LawFit]) -> str:
     told = f"; these runs do not exclude {several(alike)}" if alike else ""
     ends = f" ({several(best.at_end)} at an end of its range)" if best.at_end else ""
     return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
-
-
-def named(name: str, parameter: StageParameter) -> str:
-    """Return a parameter's name in the field's letters, and of one by mode, what it stands for."""
-    text = readable(name.replace("_", " ").replace("build up", "build-up"))
-    if not isinstance(parameter, ConstantByMode):
-        return text
-    time = significant(parameter.mean_time_s, 3)
-    return f"{text} (varies from mode to mode) at λ = {time} s"
 
 
 def how_sure(result: LoopResult) -> str:
@@ -177,23 +156,6 @@ def error_rows(result: LoopResult) -> list[dict[str, Any]]:
     return rows
 
 
-def run_rows(result: LoopResult) -> list[dict[str, Any]]:
-    """Return what each run holds, and its errors before and after."""
-    return [
-        {
-            "name": record.name,
-            "held_out": record.held_out,
-            "samples": record.time.size,
-            "end": float(record.time[-1]) if record.is_transient else None,
-            "rate": float(np.max(np.abs(record.rate))),
-            "stress": rms(record.measured),
-            "before": float(record.errors[0]),
-            "after": float(record.errors[-1]),
-        }
-        for record in result.records
-    ]
-
-
 def noise_range(result: LoopResult) -> list[float] | None:
     """Return the noise of each fitted run; None where it was given or comes from another residual.
 
@@ -206,51 +168,6 @@ def noise_range(result: LoopResult) -> list[float] | None:
         if noise and np.isclose(np.mean(noise), result.noise_floor, rtol=1e-3):
             return noise
     return None
-
-
-def stage_row(stage: Stage, number: int, letters: Mapping[str, str]) -> dict[str, Any]:
-    """Return what a stage added; its `number` tells its formula's marks from those of others.
-
-    `letters`: of its parameters, as its equation has them.
-    """
-    own = safe_name(stage.effect)
-    symbols = {name: formula(letter, f"{own}_{name}") for name, letter in letters.items()}
-    return {
-        "name": stage.effect,
-        "effect": effect_title(stage.effect),
-        "kind": KINDS[stage.kind],
-        "formula": formula(stage.equation, f"formula{number}"),
-        "parameters": [
-            {
-                "name": named(name, p) if isinstance(p, ConstantByMode) else name,
-                "symbol": symbols.get(name, "–"),
-                "value": p.value,
-                "ci95": p.ci95,
-                "unit": p.unit,
-                "left_open": name in stage.left_open,
-            }
-            for name, p in stage.parameters.items()
-        ],
-        "aliases": ", ".join(map(effect_title, stage.aliases)),
-        "source": stage.source,
-        "check": stage.check,
-        "error": stage.error,
-    }
-
-
-def explanations(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the explanations as lines of a table; none where there is only one that is certain."""
-    chosen = result.explanations.holding([stage.effect for stage in result.stages])
-    return [
-        {
-            "effects": effects_title(one.effects),
-            "twins": "; ".join(map(effects_title, one.twins)),
-            "probability": one.probability,
-            "error": one.error,
-            "chosen": one is chosen,
-        }
-        for one in result.explanations.likeliest_first
-    ]
 
 
 def inclusion(result: LoopResult) -> str:
@@ -268,65 +185,6 @@ def inclusion(result: LoopResult) -> str:
 
 
 _MOST_INCLUDED = 8
-
-
-_MOST_TESTS = 8
-
-
-def next_tests(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the tests that tell most of which explanation is right, as lines of a table."""
-    following = result.next_tests
-    titles = [effects_title(effects) for effects in following.explanations]
-    return [
-        {
-            "title": one.title,
-            "quantity": FIGURE_SYMBOLS[one.quantity],
-            "share": one.nats / following.open_nats,
-            "pairs": "; ".join(f"{titles[i]} from {titles[j]}" for i, j in one.pairs[:_MOST_PAIRS]),
-            "more": max(len(one.pairs) - _MOST_PAIRS, 0),
-        }
-        for one in following.tests[:_MOST_TESTS]
-    ]
-
-
-_MOST_PAIRS = 2
-
-
-def declared_effects(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the parameters of the effects that the study declares."""
-    return [
-        {"effect": effect_title(one.effect), "name": name, **asdict(parameter)}
-        for one in result.declared_effects
-        for name, parameter in one.parameters.items()
-    ]
-
-
-def fold_row(fold: Fold) -> dict[str, Any]:
-    """Return what was found without a run."""
-    return {
-        "run": fold.run,
-        "error_before": fold.error_before,
-        "error_after": fold.error_after,
-        "effects": ", ".join(map(effect_title, fold.effects)) or "none",
-    }
-
-
-MOST_RANKED = 12
-"""Candidates of a stage that are shown, the best."""
-
-
-def ranking_rows(ranking: Sequence[CandidateScore]) -> list[dict[str, Any]]:
-    """Return the best candidates of a stage."""
-    return [
-        {
-            "effect": effect_title(c.effect),
-            "kind": KINDS[c.kind],
-            "score": c.score,
-            "evidence": c.evidence,
-            "error": c.error,
-        }
-        for c in ranking[:MOST_RANKED]
-    ]
 
 
 _SHARES = ("error", "floor", "gain", "clock")
@@ -369,12 +227,6 @@ def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
         content["probability"] = p_value(chance)
     said = {"none", "None", "", "{}"}  # a row that says nothing is none
     return [(_REMAINING.get(k, k), value) for k, value in _flatten(content) if value not in said]
-
-
-def loadings(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the factors of loadings, run by run; none where runs are none of their own."""
-    found = result.remaining.get("loading") or {}
-    return [{"run": name, **one} for name, one in found.items()]
 
 
 def _flatten(content: Any, prefix: str = "") -> list[tuple[str, str]]:
