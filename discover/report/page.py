@@ -44,9 +44,11 @@ from discover.answer.sentences import (
 from discover.effects import StateEffect
 from discover.equations import Equation
 from discover.equations.files import FORMATS
-from discover.equations.spelling.markup import law_element
+from discover.equations.spelling.markup import law_element, term_element
 from discover.errors import InputError
+from discover.learners.registry import learner_title
 from discover.plain_numbers import json_text
+from discover.protocols.kinematics import in_words
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import parameter_name, percent, percent_range
@@ -148,6 +150,9 @@ def _environment() -> Environment:
         effect_title=effect_title,
         effects_title=effects_title,
         rms=rms,
+        term_element=term_element,
+        learner_title=learner_title,
+        quantities=in_words,
     )
     return environment
 
