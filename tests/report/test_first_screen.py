@@ -16,7 +16,7 @@ from discover.equations.parts import NamedPart
 from discover.equations.spelling.markup import law_element
 from discover.equations.spelling.plain_signs import plain
 from discover.loop.answering import rest_of_h
-from discover.report.loop.report import write_loop
+from discover.report.loop import write_loop
 from discover.report.mathtext import formula
 from discover.report.page import answer_screen, render
 from discover.study import RunFolder

@@ -1,6 +1,7 @@
-"""The tables of a closed loop's page, as rows."""
+"""The report on a closed loop: page, tables, figures, JSON and LaTeX."""
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,110 @@ from discover.laws.registry import LAWS
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
 from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by
+from discover.plain_numbers import json_text
 from discover.protocols.kinematics import ONLY_STATES
-from discover.report.wording import free_form_sentence, percent, sentence
+from discover.report.page import answer_screen, made_by, render, safe_name
+from discover.report.plots.loop.residual import (
+    by_mode_picture,
+    residual_picture,
+    waterfall_picture,
+)
+from discover.report.plots.loop.runs import (
+    AS_DECLARED,
+    WITH_EFFECTS,
+    free_form_picture,
+    lissajous_picture,
+    next_test_picture,
+    runs_picture,
+)
+from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
+from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
-from discover.words import effect_title, listed, p_value, significant
+from discover.study.run_folder import RunFolder
+from discover.words import FIGURE_SYMBOLS, effect_title, listed, p_value, significant
+
+
+def write_loop(
+    result: LoopResult,
+    folder: RunFolder,
+    name: str,
+    summary: str,
+    study_text: str = "",
+    run: dict | None = None,
+    conditions: str = "",
+) -> Path:
+    """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
+
+    `name`, `summary`: title, and the data and declared model in words. `study_text`: the study
+    file, shown at the end. `run`: what the page says of the run that made it, where that was no
+    command. `conditions`: material and temperature, for the title.
+
+    Returns the page.
+    """
+    pictures = [
+        waterfall_picture(result),
+        runs_picture(result),
+        lissajous_picture(result),
+        free_form_picture(result),
+        residual_picture(result),
+        by_mode_picture(result.by_mode, result.verdict == "unexplained"),
+        next_test_picture(result),
+    ]
+    drawn = [p for p in pictures if p is not None]
+    for one in drawn:
+        folder.write(f"figures/{safe_name(one.name)}.svg", one.svg)
+    content = json_text(result.to_json())
+    folder.write("loop.json", content)
+    folder.write("equations.tex", loop_tex(result))
+    predictions = write_predictions(loop_predictions(result), folder)
+    page = render(
+        "loop.html",
+        data={PREDICTIONS: predictions, "loop.json": content},
+        name=name,
+        conditions=conditions,
+        summary=summary,
+        result=result,
+        screen=answer_screen(result.answer),
+        sentences=loop_verdict(result),
+        error_rows=error_rows(result),
+        noise_range=noise_range(result),
+        inclusion=inclusion(result),
+        kinds=KINDS,
+        symbols=FIGURE_SYMBOLS,
+        remaining=remaining_rows(result),
+        small_faults=SMALL_FAULTS,
+        readings=[
+            (f"{name[:1].upper()}{name[1:]}", reading.sentences)
+            for name, reading in zip((AS_DECLARED, WITH_EFFECTS), result.readings, strict=True)
+            if name == AS_DECLARED or result.stages
+        ],
+        pictures=drawn,
+        run=run
+        or made_by(
+            folder.fingerprint,
+            f"discover close-loop {name}.toml",
+            ("loop.json", "predictions.csv", "equations.tex", "figures/*.svg"),
+            study_text,
+        ),
+    )
+    return folder.write("report.html", page)
+
+
+def loop_tex(result: LoopResult) -> str:
+    """Return what each stage added as LaTeX."""
+    lines = ["% Written by discover: what was added to the declared model, stage by stage."]
+    for stage in result.stages:
+        values = ", ".join(
+            f"{name} = {p.value:.6g} {p.unit} [{p.ci95[0]:.6g}, {p.ci95[1]:.6g}]"
+            for name, p in stage.parameters.items()
+        )
+        lines.append(
+            f"% {stage.effect} ({stage.kind}): {values}\n"
+            f"\\begin{{equation}}\n  {stage.equation}\n\\end{{equation}}"
+        )
+    return "\n".join(lines) + "\n"
+
 
 KINDS = {"constitutive": "in the fluid", "kinematic": "in the flow", "signal": "in the instrument"}
 
