@@ -31,9 +31,8 @@ from discover.loop.by_quantity import (
     of_stress,
     with_unseen,
 )
-from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.fitted_range import range_of
-from discover.loop.parts import STRUCTURES, Stage
+from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import (

@@ -11,8 +11,13 @@ from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
 from discover.laws import Fluid
 from discover.laws.each_mode import with_modes
-from discover.loop.constants import ConstantByMode, StageParameter, end_of_range
-from discover.loop.parts import DeclaredEffect, KnownParameter
+from discover.loop.parts import (
+    ConstantByMode,
+    DeclaredEffect,
+    KnownParameter,
+    StageParameter,
+    end_of_range,
+)
 from discover.programs import on_device
 
 Bounds = Mapping[int, tuple[float, float]]

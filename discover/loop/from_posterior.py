@@ -18,12 +18,6 @@ from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE, Rows
-from discover.loop.constants import (
-    ConstantByMode,
-    ModeConstant,
-    StageParameter,
-    end_of_range,
-)
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.final_model import (
     Bounds,
@@ -35,7 +29,15 @@ from discover.loop.final_model import (
 )
 from discover.loop.loop_result import LoopResult
 from discover.loop.measured_rates import instants_found
-from discover.loop.parts import CandidateScore, LawFit, Stage
+from discover.loop.parts import (
+    CandidateScore,
+    ConstantByMode,
+    LawFit,
+    ModeConstant,
+    Stage,
+    StageParameter,
+    end_of_range,
+)
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested

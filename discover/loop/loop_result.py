@@ -27,10 +27,10 @@ from discover.inference.engine.design import NextTests
 from discover.inference.engine.free_functions import FreeForm
 from discover.laws import Fluid
 from discover.loop.answering import loop_answer
-from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.expected_errors import Spread
 from discover.loop.parts import (
     CandidateScore,
+    ConstantByMode,
     DeclaredEffect,
     ErrorPair,
     Explanations,
@@ -38,6 +38,7 @@ from discover.loop.parts import (
     LawFit,
     NearestLaw,
     Stage,
+    StageParameter,
     Verdict,
 )
 from discover.loop.reading import Reading, read_residual

@@ -8,9 +8,8 @@ from discover.answer.simple_material import SimpleMaterial, material_of, recogni
 from discover.dataset import Run
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.inference.engine.inelastic import Inelastic
-from discover.loop.constants import StageParameter
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import Explanation, Explanations, Stage
+from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.run_record import RunRecord, errors_of, record_runs
 from discover.loop.runs import why_untested
 from discover.loop.task import Task

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.loop import FreeForm
-from discover.loop.constants import ConstantByMode, StageParameter
+from discover.loop.parts import ConstantByMode, StageParameter
 from discover.protocols.kinematics import MODULI
 from discover.words import (
     FIGURE_SYMBOLS,

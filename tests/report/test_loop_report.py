@@ -10,8 +10,14 @@ from standing_alone import stands_alone
 
 from discover.effects import make_effect
 from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stage
-from discover.loop.constants import ConstantByMode, ModeConstant, StageParameter
-from discover.loop.parts import Explanation, Explanations, Fold
+from discover.loop.parts import (
+    ConstantByMode,
+    Explanation,
+    Explanations,
+    Fold,
+    ModeConstant,
+    StageParameter,
+)
 from discover.report.loop import loop_verdict, noise_range, remaining_rows, write_loop
 from discover.report.page import render
 from discover.report.plots.loop.residual import (

@@ -7,7 +7,7 @@ import numpy as np
 from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
 from discover.loop.by_quantity import FASTER
-from discover.loop.constants import ConstantByMode
+from discover.loop.parts import ConstantByMode
 from discover.report.plots.loop.runs import (
     FIT_COLOUR,
     HELD_COLOUR,
