@@ -129,7 +129,8 @@ def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
     rival = min(_fit(law, runs).criterion for law in others)
     if chosen.criterion > rival - (_AHEAD if best == "herschel_bulkley" else 0.0):
         return None
-    return _material(best, chosen)
+    spread = np.exp(np.outer(chosen.quantile * chosen.deviation, (-1.0, 1.0)))
+    return material_of(best, chosen.values, chosen.values[:, None] * spread, chosen.error)
 
 
 def _is_simple(run: Run) -> bool:
@@ -152,7 +153,8 @@ def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
         storage = run.quantity == MODULI[0]
         omega = run.angular_frequency
         if law in ("maxwell", "two_modes"):
-            each = [_of_mode(omega * time, storage) * g for g, time in _modes(law, values)]
+            pairs = ((omega * time, g) for g, time in _modes(law, values))
+            each = [(x**2 if storage else x) / (1.0 + x**2) * g for x, g in pairs]
             whole = np.sum(each, axis=0)
             return whole if storage or law == "two_modes" else whole + values[2] * omega
         if storage:
@@ -176,10 +178,6 @@ def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
 def _modes(law: str, values: Values) -> list[tuple[float, float]]:
     pairs = [(values[0], values[1]), (values[2], values[3])] if law == "two_modes" else [values[:2]]
     return [(float(modulus), float(time)) for modulus, time in pairs]
-
-
-def _of_mode(x: np.ndarray, storage: bool) -> np.ndarray:
-    return (x**2 if storage else x) / (1.0 + x**2)
 
 
 def _strain(run: Run) -> Float[np.ndarray, " n"]:
@@ -402,11 +400,6 @@ _RHEOTOOL: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
 
 _CAPS = {"herschel_bulkley": "eta0", "power_law": "etaMax"}
 """Entry of a largest viscosity."""
-
-
-def _material(law: str, fit: _Fit) -> SimpleMaterial:
-    spread = np.exp(np.outer(fit.quantile * fit.deviation, (-1.0, 1.0)))
-    return material_of(law, fit.values, fit.values[:, None] * spread, fit.error)
 
 
 def material_of(

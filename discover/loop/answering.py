@@ -17,7 +17,6 @@ from discover.answer import (
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
-from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
 from discover.equations.formats.rheotool import DENSITY
@@ -207,19 +206,15 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
         return None
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
-    maximum = " (flow curve with a maximum)" if _has_maximum(near) else ""
+    name, least = _MAXIMUM.get(near.law, ("", 0.0))
+    has_maximum = name in near.constants and near.constants[name].value > least
+    maximum = " (flow curve with a maximum)" if has_maximum else ""
     return f"{', '.join(said)}{maximum}", near.size
 
 
 _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
-"""Constant above which the shear stress of a mode falls with the rate   [Giesekus 1982, J.
+"""Constant above which the flow curve of each mode has a maximum   [Giesekus 1982, J.
 Non-Newtonian Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255]."""
-
-
-def _has_maximum(near: Any) -> bool:
-    """Return whether the flow curve of each mode of a classical law has a maximum."""
-    name, least = _MAXIMUM.get(near.law, ("", 0.0))
-    return name in near.constants and near.constants[name].value > least
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -318,14 +313,9 @@ def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     if stage.kind != "constitutive" or stage.effect in (*LAW_OF_EFFECT, *STRUCTURES):
         return found
     first, *others = found
-    meaning = "; ".join(filter(None, [first.said, f"odds for it {_odds(stage.evidence)}"]))
-    return replace(first, meaning=meaning), *others
-
-
-def _odds(evidence: float) -> str:
-    """Return odds for an effect that was added, of twice their logarithm."""
-    odds = float(np.exp(min(0.5 * evidence, 10.0)))
-    return f"> {_SURE}:1" if odds > _SURE else f"{significant(odds, 2)}:1"
+    odds = float(np.exp(min(0.5 * stage.evidence, 10.0)))
+    told = f"odds for it {f'> {_SURE}' if odds > _SURE else significant(odds, 2)}:1"
+    return replace(first, meaning="; ".join(filter(None, [first.said, told]))), *others
 
 
 _SURE = 1000
@@ -340,43 +330,27 @@ def _constants(
 ) -> tuple[Constant, ...]:
     known = parameters_of(effect) if effect else {}
     spelled = letters or {name: one.symbol for name, one in known.items()}
-    return tuple(
-        Constant(
-            name,
-            one.value,
-            one.ci95,
-            one.unit or "1",
-            name not in left_open and not (isinstance(one, StageParameter) and one.is_open),
-            _of_mode(one, name, spelled.get(name, "")),
-            meaning=_of_mean_mode(one, _meaning(effect, known[name]) if name in known else ""),
-            end=one.at_end if isinstance(one, StageParameter) else "",
-            over_modes=one.span if isinstance(one, ConstantByMode) and _differs(one) else None,
-        )
-        for name, one in parameters.items()
-    )
-
-
-def _of_mode(one: Any, name: str, letter: str) -> str:
-    """Return the letter of a constant, with the index of the mode where it differs."""
-    return f"{letter or readable(name)}_k" if _differs(one) else letter
-
-
-def _differs(one: Any) -> bool:
-    """Return whether a constant differs from mode to mode."""
-    return isinstance(one, ConstantByMode) and bool(one.degree)
-
-
-def _of_mean_mode(one: Any, meaning: str) -> str:
-    """Return what a constant is; of one that differs from mode to mode, where its values stand."""
-    place = "each under “Constants by mode”" if _differs(one) else ""
-    return "; ".join(filter(None, [meaning, place]))
-
-
-def _meaning(effect: str, parameter: EffectParameter) -> str:
-    """Return what a parameter is, in a few words; a letter stands for its effect."""
-    words = parameter.name.replace("_", " ")
-    is_letter = len(words) < 3 or readable(words) != words
-    return parameter.meaning or (effect_title(effect) if is_letter else words)
+    found = []
+    for name, one in parameters.items():
+        by_mode = one if isinstance(one, ConstantByMode) and one.degree else None
+        fitted = one if isinstance(one, StageParameter) else None
+        letter, meaning = spelled.get(name, ""), ""
+        if name in known:  # what it is, in a few words; a letter stands for its effect
+            words = name.replace("_", " ")
+            is_letter = len(words) < 3 or readable(words) != words
+            meaning = known[name].meaning or (effect_title(effect) if is_letter else words)
+        if by_mode is not None:
+            letter = f"{letter or readable(name)}_k"
+            meaning = "; ".join(filter(None, [meaning, "each under “Constants by mode”"]))
+        found.append(
+            Constant(
+                name, one.value, one.ci95, one.unit or "1",
+                name not in left_open and not (fitted is not None and fitted.is_open),
+                letter, meaning, "" if fitted is None else fitted.at_end,
+                None if by_mode is None else by_mode.span,
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def _renamed(

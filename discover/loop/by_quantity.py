@@ -125,7 +125,9 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
             found[kind] = own
             continue
         apart = differing(result, kind)
-        differ = "" if apart is None else f"laws that fit as well differ by {_at_most(apart)}"
+        much = apart is not None and apart > MUCH  # of laws that diverge only that it is much
+        by = f"more than {percent_of(MUCH)}" if much else percent_of(apart or 0.0)
+        differ = "" if apart is None else f"laws that fit as well differ by {by}"
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
@@ -161,23 +163,14 @@ _NOTHING = 1e-3
 def normal_stress_settled(result: Any) -> bool:
     """Return whether laws that describe the runs as well have one N1: more than linear response."""
     apart = differing(result, "N1")
-    return apart is not None and apart < _APART and not _only_linear(result)
+    only_linear = all(record.control == "oscillation" for record in result.records)
+    return apart is not None and apart < _APART and not only_linear
 
 
 def differing(result: Any, kind: str) -> float | None:
     """Return by how much laws that fit as well differ in a quantity in the range."""
     spread = result.spread_of_laws.get(kind)
     return None if spread is None else spread.inside
-
-
-def _at_most(apart: float) -> str:
-    """Return by how much laws differ; of laws that diverge only that it is much."""
-    return percent_of(apart) if apart <= MUCH else f"more than {percent_of(MUCH)}"
-
-
-def _only_linear(result: Any) -> bool:
-    """Return whether nothing but linear response was measured."""
-    return all(record.control == "oscillation" for record in result.records)
 
 
 def of_stress(result: Any) -> ExpectedError:

@@ -17,7 +17,7 @@ from discover.forward.declared import DEGREE, constants_of_modes
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import TORQUE, Rows
+from discover.inference.engine.rows import TORQUE
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.final_model import (
     Bounds,
@@ -178,24 +178,14 @@ class Ended(Path):
             (name,) = set(after.names) - set(before.names)
             effect, model = self.posterior.problem.effects[name], self.posterior.problem.model
             at = dict(zip((p.name for p in effect.parameters), model.positions(name), strict=True))
-            parameters = {
-                p.name: StageParameter(
-                    float(self.fit.theta[at[p.name]]),
-                    self.bounds[at[p.name]],
-                    p.unit,
-                    at_end=end_of_range(
-                        float(self.fit.theta[at[p.name]]),
-                        float(model.low[at[p.name]]),
-                        float(model.high[at[p.name]]),
-                    ),
-                )
-                for p in effect.parameters
-            }
-            left_open = tuple(
-                key
-                for key, one in parameters.items()
-                if one.is_open_up_to(float(model.high[at[key]]))
-            )
+            parameters, left_open = {}, []
+            for p in effect.parameters:
+                place = at[p.name]
+                value = float(self.fit.theta[place])
+                end = end_of_range(value, float(model.low[place]), float(model.high[place]))
+                parameters[p.name] = StageParameter(value, self.bounds[place], p.unit, at_end=end)
+                if parameters[p.name].is_open_up_to(float(model.high[place])):
+                    left_open.append(p.name)
             if name in self.by_mode:
                 parameters[effect.parameters[0].name] = self.by_mode[name]
             gained = 2.0 * (search.rank(after) - search.rank(before))
@@ -204,7 +194,7 @@ class Ended(Path):
                 Stage(
                     name, effect.kind, parameters, aliases, errors_of(self.records, i),
                     float(gained), spelled[name].equation, effect.source, effect.check,
-                    left_open=left_open,
+                    left_open=tuple(left_open),
                 )
             )  # fmt: skip
         return tuple(found)
@@ -243,9 +233,10 @@ class Ended(Path):
         problem, fit = self.posterior.problem, self.fit
         rows = problem.fitted
         fitter = self.posterior.search.fitter
-        left = np.zeros(rows.batch.recorded.shape)
+        left, recorded = np.zeros((2, *rows.batch.recorded.shape))
         left[rows.seen] = (fitter.record(fit) - rows.recorded) / rows.size
-        probability = noise_probability(left, rows.seen.astype(float), _padded(rows))
+        recorded[rows.seen] = rows.recorded
+        probability = noise_probability(left, rows.seen.astype(float), recorded)
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs
@@ -391,9 +382,3 @@ def result_of(
         fluid_at_mean=fluid if whole else None,
         states=states or (),
     )
-
-
-def _padded(rows: Rows) -> Float[np.ndarray, "runs n"]:
-    out = np.zeros(rows.batch.recorded.shape)
-    out[rows.seen] = rows.recorded
-    return out

@@ -49,12 +49,6 @@ _SLOW = 0.3
 """Least share of the time that fits are taken to have had, the rest being seconds besides."""
 
 
-def _may_differ(names: str) -> bool:
-    """Return whether one of several effects has constants that may differ from mode to mode."""
-    known = {**built_in_effects(), **named_effects()}
-    return any(may_differ_by_mode(known[one]) for one in names.split(", ") if one in known)
-
-
 class SearchTime:
     """Seconds left of searches one after another, by their lines.
 
@@ -96,7 +90,10 @@ class SearchTime:
     def heard(self, line: str) -> float | None:
         """Return the seconds left after a line of the search; None before anything was fitted."""
         if likeliest := re.search(r"likeliest: (.*)", line):
-            self._follows = self._several_modes and _may_differ(likeliest[1])
+            known = {**built_in_effects(), **named_effects()}
+            names = (one for one in likeliest[1].split(", ") if one in known)
+            differ = any(may_differ_by_mode(known[one]) for one in names)
+            self._follows = self._several_modes and differ
             self._near = _FEW_NEAR if likeliest[1] == "none" else 1.0
         if found := re.search(r"search among (\d+)", line):
             self._search(float(found[1]))

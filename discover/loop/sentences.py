@@ -39,12 +39,12 @@ def untested_by(result: Any) -> str:
 def suspected(result: Any) -> list[Any]:
     """Return the effects that are no part of the fluid, those with a size and the surest first."""
     own = [stage for stage in result.stages if stage.kind != "constitutive"]
-    return sorted(own, key=lambda stage: (_may_be_zero(stage), -stage.evidence))
 
+    def order(stage: Any) -> tuple[bool, float]:
+        ends = next((one.ci95 for one in stage.parameters.values()), None) or (1.0, 1.0)
+        return ends[0] * ends[1] <= 0.0, -stage.evidence  # those that may be zero come last
 
-def _may_be_zero(stage: Any) -> bool:
-    ends = next((one.ci95 for one in stage.parameters.values()), None)
-    return ends is not None and ends[0] * ends[1] <= 0.0
+    return sorted(own, key=order)
 
 
 def doubted(result: Any) -> float | None:
@@ -109,15 +109,6 @@ def _as_clause(check: str) -> str:
     """Return the check of an effect as it goes on in a sentence; N2 keeps its capital."""
     check = check.rstrip(". ")
     return check if check[1:2].isdigit() else check[:1].lower() + check[1:]
-
-
-def _worst(result: Any) -> str:
-    """Return the fitted run that is missed most, by its own size."""
-    by_run = (result.discrepancy or {}).get("by_run", {})
-    fitted = [record for record in result.records if not record.held_out]
-    sheared = [record for record in fitted if record.flow == "shear"]  # in a gap
-    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in sheared or fitted}
-    return max(errors, key=lambda name: errors[name], default="one run")
 
 
 def _of_the_instrument(result: Any) -> str:
@@ -186,8 +177,14 @@ _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
 
 
 def _by_geometry(result: Any) -> str:
-    """Return which run to repeat where nothing says whether instrument or fluid is amiss."""
-    run = _worst(result)
+    """Return which run to repeat where nothing says whether instrument or fluid is amiss.
+
+    The fitted one that is missed most, by its own size.
+    """
+    by_run = (result.discrepancy or {}).get("by_run", {})
+    fitted = [record for record in result.records if not record.held_out]
+    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in _sheared(result) or fitted}
+    run = max(errors, key=lambda name: errors[name], default="one run")
     return f"Repeat {run} with another gap, to separate instrument and fluid."
 
 

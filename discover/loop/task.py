@@ -125,7 +125,8 @@ class Task:
         """
         problem = self.problem(declared)
         self.say(f"search among {len(problem.candidates)} effects")
-        if not is_sound(problem):
+        # the model without any effect
+        if not np.all(np.isfinite(Fitter(problem, problem.fitted).predict([problem.zero]))):
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
             )
@@ -204,12 +205,6 @@ def log_evidence(search: Search) -> float:
     """Return the log of evidence times prior of all hypotheses of a search together."""
     alive = search.alive()
     return float(np.logaddexp.reduce([search.rank(fit) for fit in alive])) if alive else -np.inf
-
-
-def is_sound(problem: Problem) -> bool:
-    """Return whether the model without any effect can be integrated through the fitted runs."""
-    predicted = Fitter(problem, problem.fitted).predict([problem.zero])
-    return bool(np.all(np.isfinite(predicted)))
 
 
 def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:

@@ -90,11 +90,6 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
     }
 
 
-def _as_link(name: str) -> str:
-    """Return a file's name as it stands in a link, be it UTF-8 or not."""
-    return quote(os.fsencode(name))
-
-
 _MOST_INSIDE = 3_000_000
 """Characters of a file that a page carries; more would make the page slow to open."""
 
@@ -140,9 +135,10 @@ def _environment() -> Environment:
         readable=readable,
         subscripts=_subscripts,
         explained=_explained,
-        file_name=_file_name,
+        # a name of a file may break behind an underscore
+        file_name=lambda text: Markup(str(escape(text)).replace("_", "_<wbr>")),
         safe_svg=Markup,
-        as_link=_as_link,
+        as_link=lambda name: quote(os.fsencode(name)),  # be it UTF-8 or not
         in_units=in_units,
         formula=formula,
         safe_name=safe_name,
@@ -378,11 +374,6 @@ def _in_cell(text: str) -> str:
         return text
     whole = _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace(")\N{NO-BREAK SPACE}", ") ")
     return re.sub("(×\N{NO-BREAK SPACE}10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)\N{NO-BREAK SPACE}", r"\1 ", whole)
-
-
-def _file_name(text: str) -> Markup:
-    """Return a note, escaped, in which a name of a file may break behind an underscore."""
-    return Markup(str(escape(text)).replace("_", "_<wbr>"))
 
 
 def _typeset(answer: Answer) -> str:

@@ -113,7 +113,8 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
     for path in paths:
         try:
             one = _read(path, mapping)
-            sources.append(_source(path))
+            digest = hashlib.sha256(read_bytes(path, path.name)).hexdigest()
+            sources.append(Source(file=str(path), sha256=digest))
         except InputError as error:
             if len(paths) == 1:
                 raise
@@ -311,8 +312,3 @@ def _is_part(key: str, made: Record) -> bool:
     if key == "strain":
         return "strain" in made.table or "step_strain" in made.conditions
     return key in made.table or key in _THROUGH | {INSTRUMENT.get(name) for name in made.table}
-
-
-def _source(path: Path) -> Source:
-    digest = hashlib.sha256(read_bytes(path, path.name)).hexdigest()
-    return Source(file=str(path), sha256=digest)

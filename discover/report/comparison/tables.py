@@ -17,6 +17,7 @@ from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
+    known,
     learner_as_subject,
     percent,
     sentence,
@@ -72,18 +73,19 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for flow in comparison.judged:
         band = comparison.claimed(flow)
-        widths = {} if band is None else band.half_widths()
+        of_posterior = {} if band is None else band.half_widths()
         cells = []
         for who in ("before", *comparison.outcomes):
             if who == "tensor_sindy":
-                mine = widths if comparison.determined_terms else {}
+                widths = of_posterior if comparison.determined_terms else {}
             else:
-                mine = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+                widths = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+            finite = {name: width for name, width in widths.items() if known(width)}
             law = comparison.before if who == "before" else comparison.outcomes[who].predictions
             cells += [
                 {
                     "value": value,
-                    "half_width": None if value is None else known_or_none(mine.get(name)),
+                    "half_width": None if value is None else finite.get(name),
                     "runs_away": law[flow.key] is None and name in flow.reference,
                 }
                 for name, value in comparison.errors(who, flow).items()
@@ -97,11 +99,6 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def known_or_none(width: float | None) -> float | None:
-    """Return a width; None where it is not finite."""
-    return None if width is None or not np.isfinite(width) else width
 
 
 def laws_fitted(comparison: Comparison) -> dict[str, Any]:

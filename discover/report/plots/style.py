@@ -165,7 +165,8 @@ class Picture:
         text = text.replace("url(#", f"url(#{prefix}-").replace('href="#', f'href="#{prefix}-')
         text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
         # the page decides the width
-        text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", _without_height(text), count=1)
+        for size in ("height", "width"):
+            text = re.sub(rf'(<svg[^>]*?) {size}="[^"]*"', r"\1", text, count=1)
         description = html.escape(self.caption or self.name, quote=True)
         told = f'role="img" aria-label="{description}"'
         if self.axes:
@@ -187,10 +188,6 @@ class Picture:
         for colour, variable in _VARIABLES.items():
             text = text.replace(colour, f"var(--{variable})")
         return text
-
-
-def _without_height(text: str) -> str:
-    return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
 
 
 @contextmanager

@@ -78,7 +78,9 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
                     for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
                         panel.plot(along, stresses[quantity][last], **style)
             _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
-            _mark_training(row[0], flow)
+            if flow.training_end is not None and flow.training_end < flow.times[-1]:
+                span = flow.times[0], flow.training_end
+                row[0].axvspan(*span, color=SHADE, lw=0, label="training times", zorder=0)
             _mark_open(row[0], comparison, flow, quantity)
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
             for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
@@ -234,13 +236,6 @@ def _in_decades(flow: Flow, quantity: str) -> bool:
         return quantity != "N2"
     strain = flow.reference.get("sigma12") if flow.records_strain else None
     return strain is not None and bool(np.min(strain) > 0.0) and np.ptp(np.log(strain)) > _DECADES
-
-
-def _mark_training(panel, flow: Flow) -> None:
-    if flow.training_end is not None and flow.training_end < flow.times[-1]:
-        panel.axvspan(
-            flow.times[0], flow.training_end, color=SHADE, lw=0, label="training times", zorder=0
-        )
 
 
 def _mark_open(panel, comparison: Comparison, flow: Flow, quantity: str) -> None:

@@ -167,9 +167,11 @@ def error_map_picture(comparison: Comparison) -> Picture | None:
 def _draw_cells(panel, cells: Cells, colour: str) -> None:
     """Draw one number a cell, the deeper the larger on a logarithmic scale."""
     weissenberg, deborah = _axes_of(cells)
+    span = np.log(_HIGHEST / _LOWEST)
     for (wi, de), value in cells.items():
         x, y = deborah.index(de), weissenberg.index(wi)
-        strength = 0.0 if value is None else _strength(value)
+        share = 0.0 if value is None else np.log(max(value, 1e-300) / _LOWEST) / span
+        strength = float(np.clip(share, 0.0, 1.0))
         panel.bar(x, 1.0, 1.0, y - 0.5, color=colour, alpha=strength * _STRONGEST, linewidth=0)
         text = "∞" if value == np.inf else percent(value).replace(" %", "")
         if value is not None and _TOLD < value < np.inf:
@@ -180,11 +182,6 @@ def _draw_cells(panel, cells: Cells, colour: str) -> None:
     panel.set_xlim(-0.5, len(deborah) - 0.5)
     panel.set_ylim(-0.5, len(weissenberg) - 0.5)
     panel.grid(False)
-
-
-def _strength(value: float) -> float:
-    span = np.log(_HIGHEST / _LOWEST)
-    return float(np.clip(np.log(max(value, 1e-300) / _LOWEST) / span, 0.0, 1.0))
 
 
 def _axes_of(cells: Cells) -> tuple[list[float], list[float]]:

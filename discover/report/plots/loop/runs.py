@@ -75,15 +75,6 @@ def along_in_common(records: Sequence[RunRecord]) -> str:
     return " or ".join(dict.fromkeys(record.along[0] for record in records))
 
 
-def _as_flow_curve(panel, record: RunRecord) -> None:
-    """Draw states with logarithmic axes, from a little below the least that was seen."""
-    seen = record.measured[record.measured > 0.0]
-    panel.set_xscale("log")
-    if seen.size == record.measured.size:
-        panel.set_yscale("log")
-        panel.set_ylim(0.5 * float(np.min(seen)), 3.0 * float(np.max(seen)))
-
-
 def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     found = {record.quantity for record in records}
     kinds = {quantity: FIGURE_SYMBOLS[quantity] for quantity in FIGURE_SYMBOLS if quantity in found}
@@ -136,7 +127,12 @@ def drawn_runs(
             if through_decades(record):
                 make_logarithmic(panel.xaxis)
             if not record.is_transient:
-                _as_flow_curve(panel, record)
+                # from a little below the least that was seen
+                seen = record.measured[record.measured > 0.0]
+                panel.set_xscale("log")
+                if seen.size == record.measured.size:
+                    panel.set_yscale("log")
+                    panel.set_ylim(0.5 * float(np.min(seen)), 3.0 * float(np.max(seen)))
             elif high > THOUSANDS:
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
             panel.set_title(short_title(record), fontsize=8)
@@ -224,7 +220,9 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
                         label="measured, all cycles", zorder=1,
                     )  # fmt: skip
                 draw_run(panel, record, along, last, last)
-                _frame(panel, record.measured)
+                low, high = float(record.measured.min()), float(record.measured.max())
+                margin = 0.6 * (high - low) or 1.0
+                panel.set_ylim(low - margin, high + margin)
             axes[0, column].set_title(short_title(record), fontsize=8)
             axes[0, column].set_xlabel("strain γ")
             axes[1, column].set_xlabel("γ̇ (1/s)")
@@ -240,12 +238,6 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
             "Elastic (above) and viscous (below) Lissajous curves: models in the last cycle, "
             f"measurements in all of them, faint. Over each the errors of the run.{left}",
         )
-
-
-def _frame(panel, stress: np.ndarray) -> None:
-    low, high = float(stress.min()), float(stress.max())
-    margin = 0.6 * (high - low) or 1.0
-    panel.set_ylim(low - margin, high + margin)
 
 
 _AXES = {
