@@ -81,7 +81,7 @@ class SimpleMaterial:
             kind, names = _RHEOTOOL[self.law]
             entries = {
                 name: (quantity, one.value)
-                for (name, quantity), one in zip(names, self.constants, strict=True)
+                for (name, quantity), one in zip(names.items(), self.constants, strict=True)
             }
             if cap := _CAPS.get(self.law):
                 # rheoTool wants a largest viscosity: that of a tenth of the slowest rate
@@ -306,35 +306,25 @@ def _stands_out(law: str, fit: _Fit, runs: Sequence[Run]) -> bool:
 
 # words --------------------------------------------------------------------------------------------
 
-_NAMES: dict[str, tuple[Kind, str, tuple[tuple[str, str], ...]]] = {
-    "newtonian": ("viscous", "viscous fluid (Newtonian)", (("viscosity_Pa_s", "Pa s"),)),
+_NAMES: dict[str, tuple[Kind, str, dict[str, str]]] = {
+    "newtonian": ("viscous", "viscous fluid (Newtonian)", {"viscosity_Pa_s": "Pa s"}),
     "herschel_bulkley": (
-        "yield_stress",
-        "yield-stress fluid (Herschel–Bulkley)",
-        (("yield_stress_Pa", "Pa"), ("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
+        "yield_stress", "yield-stress fluid (Herschel–Bulkley)",
+        {"yield_stress_Pa": "Pa", "consistency_Pa_sn": "Pa sⁿ", "flow_index": "1"},
     ),
     "power_law": (
-        "viscous",
-        "viscous fluid (power law)",
-        (("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
+        "viscous", "viscous fluid (power law)", {"consistency_Pa_sn": "Pa sⁿ", "flow_index": "1"},
     ),
     "carreau_yasuda": (
-        "viscous",
-        "viscous fluid (Carreau–Yasuda)",
-        (
-            ("zero_shear_viscosity_Pa_s", "Pa s"),
-            ("infinite_shear_viscosity_Pa_s", "Pa s"),
-            ("critical_time_s", "s"),
-            ("flow_index", "1"),
-            ("sharpness", "1"),
-        ),
+        "viscous", "viscous fluid (Carreau–Yasuda)",
+        {"zero_shear_viscosity_Pa_s": "Pa s", "infinite_shear_viscosity_Pa_s": "Pa s",
+         "critical_time_s": "s", "flow_index": "1", "sharpness": "1"},
     ),
     "kelvin_voigt": (
-        "solid",
-        "solid (Kelvin–Voigt)",
-        (("elastic_modulus_Pa", "Pa"), ("viscosity_Pa_s", "Pa s")),
+        "solid", "solid (Kelvin–Voigt)", {"elastic_modulus_Pa": "Pa", "viscosity_Pa_s": "Pa s"},
     ),
-}
+}  # fmt: skip
+"""What a material is, its name for readers, and its constants with their units."""
 
 _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
     "newtonian": lambda v: rf"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {v[0]}",
@@ -377,23 +367,14 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
 }
 
 
-_RHEOTOOL: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
-    "newtonian": ("Newtonian", (("eta", "viscosity"),)),
+_RHEOTOOL: dict[str, tuple[str, dict[str, str]]] = {
+    "newtonian": ("Newtonian", {"eta": "viscosity"}),
     # k has the dimensions of a viscosity there, its rate being counted in 1/s
-    "herschel_bulkley": (
-        "HerschelBulkley",
-        (("tau0", "stress"), ("k", "viscosity"), ("n", "number")),
-    ),
-    "power_law": ("PowerLaw", (("k", "viscosity"), ("n", "number"))),
+    "herschel_bulkley": ("HerschelBulkley", {"tau0": "stress", "k": "viscosity", "n": "number"}),
+    "power_law": ("PowerLaw", {"k": "viscosity", "n": "number"}),
     "carreau_yasuda": (
         "CarreauYasuda",
-        (
-            ("eta0", "viscosity"),
-            ("etaInf", "viscosity"),
-            ("k", "time"),
-            ("n", "number"),
-            ("a", "number"),
-        ),
+        {"eta0": "viscosity", "etaInf": "viscosity", "k": "time", "n": "number", "a": "number"},
     ),
 }
 """rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]."""
@@ -413,7 +394,7 @@ def material_of(
     kind, title, names = _NAMES[law]
     constants = tuple(
         Constant(name, float(value), (float(low), float(high)), unit)
-        for (name, unit), value, (low, high) in zip(names, values, ci95, strict=True)
+        for (name, unit), value, (low, high) in zip(names.items(), values, ci95, strict=True)
     )
     latex = _LATEX[law]([f"{value:.6g}" for value in values])
     return SimpleMaterial(

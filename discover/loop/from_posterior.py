@@ -233,10 +233,9 @@ class Ended(Path):
         problem, fit = self.posterior.problem, self.fit
         rows = problem.fitted
         fitter = self.posterior.search.fitter
-        left, recorded = np.zeros((2, *rows.batch.recorded.shape))
-        left[rows.seen] = (fitter.record(fit) - rows.recorded) / rows.size
-        recorded[rows.seen] = rows.recorded
-        probability = noise_probability(left, rows.seen.astype(float), recorded)
+        padded = np.zeros((2, *rows.batch.recorded.shape))
+        padded[:, rows.seen] = (fitter.record(fit) - rows.recorded) / rows.size, rows.recorded
+        probability = noise_probability(padded[0], rows.seen.astype(float), padded[1])
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs
