@@ -16,31 +16,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup, escape
 
 from discover._version import __version__
-from discover.answer import Answer, Constant, Suspect
-from discover.answer.modes_in_words import (
-    FEW_MODES,
-    as_constant,
-    degrees,
-    in_order,
-    linear_part,
-    reduced_to,
-    shifts,
-    shortened,
-)
-from discover.answer.sentences import (
-    CLASSICAL,
-    NOT_SEPARABLE,
-    SUSPECTED,
-    SYMBOLS,
-    error_title,
-    expected,
-    is_a_set,
-    law,
-    note,
-    quality,
-    separable,
-    worst_run,
-)
+from discover.answer import Answer, Constant, Suspect, sentences
+from discover.answer import modes_in_words as modes
 from discover.effects import StateEffect
 from discover.equations import Equation
 from discover.equations.files import FORMATS
@@ -54,7 +31,6 @@ from discover.report.plots.style import style_sheet
 from discover.report.wording import parameter_name, percent, percent_range
 from discover.statistics.noise.noise_model import rms
 from discover.words import (
-    LEVEL,
     effect_title,
     effects_title,
     estimate,
@@ -140,6 +116,8 @@ def _environment() -> Environment:
         safe_svg=Markup,
         as_link=lambda name: quote(os.fsencode(name)),  # be it UTF-8 or not
         in_units=in_units,
+        unbroken=_unbroken,
+        in_cell=_in_cell,
         formula=formula,
         safe_name=safe_name,
         parameter_name=parameter_name,
@@ -150,6 +128,7 @@ def _environment() -> Environment:
         learner_title=learner_title,
         quantities=in_words,
     )
+    environment.globals.update(answer_sentences=sentences, modes=modes)
     return environment
 
 
@@ -202,65 +181,42 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
     if answer is None:
         return None
-    found: dict[str, Any] = {
-        "title": (answer.title or answer.instead.lower()).partition(":")[0],
-        "headline": _unbroken(law(answer)),
-        "quality": _unbroken(quality(answer)),
-        "level": LEVEL,
-        "errors": error_title(answer).lower(),
-        "open": not answer.title or answer.adequate is False,
-        "law": "", "constants": (), "suspects": (), "suspected": SUSPECTED.lower(),
-        "expected": (), "modes": (), "linear": "", "few": 0, "solvent": "", "set": False,
-        "copies": (), "missing": "",
-        "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
-        "behind": _unbroken(answer.alternative),
-        "next_test": _unbroken(answer.next_test),
-    }  # fmt: skip
-    if not answer.title:
-        return found
-    solvent = answer.solvent_viscosity_Pa_s
-    symbols = [one.symbol for one in answer.constants]
+    headline, symbols = _unbroken(sentences.law(answer)), [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
         # terms as the equation in Pa and s has them: over the stress of a mode in units of G
         for i, one in enumerate(answer.constants):
             if one.is_term:
                 symbols[i] = one.symbol.replace("σ", "τ")
-                found["headline"] = found["headline"].replace(one.symbol, symbols[i])
-    return found | {
+                headline = headline.replace(one.symbol, symbols[i])
+    reduced = modes.reduced_to(answer)
+    shifted = [
+        ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)} than at {reduced}",
+         significant(one, 3), "") for at, one in modes.shifts(answer)
+    ]  # fmt: skip
+    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
+    clock = "; times on the instrument's clock" if timed and answer.shift_factors else ""
+    return {
+        "answer": answer,
+        "title": (answer.title or answer.instead.lower()).partition(":")[0],
+        "headline": headline,
+        "quality": _unbroken(sentences.quality(answer)),
+        "errors": sentences.error_title(answer).lower(),
+        "open": not answer.title or answer.adequate is False,
         "law": _typeset(answer),
         "constants": [
-            (symbol, _unbroken(_said(one)), _in_cell(one.number), _in_cell(one.interval))
-            for symbol, one in zip(symbols, answer.constants, strict=True)
-        ]
-        + [
-            (
-                "a_T",
-                f"at {degrees(at)}: times {shortened(one)} than at {reduced_to(answer)}",
-                significant(one, 3),
-                "",
-            )
-            for at, one in shifts(answer)
+            *((symbol, _unbroken(_said(one)), _in_cell(one.number), _in_cell(one.interval))
+              for symbol, one in zip(symbols, answer.constants, strict=True)),
+            *shifted,
         ],
-        "set": is_a_set(answer),
-        "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
-        "suspected": SUSPECTED.lower() + _clock(answer),
-        "expected": _expected(answer) + _worst(answer),
-        "modes": [
-            tuple(as_constant(answer, one) for one in (mode.modulus_Pa, mode.relaxation_time_s))
-            for mode in in_order(answer)
-        ],
-        "linear": _unbroken(linear_part(answer)),
-        "few": FEW_MODES,
-        "solvent": _in_cell(f"{as_constant(answer, solvent)} Pa s") if solvent else "",
-        "copies": (copies := _copies(answer)),
+        "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
+        "suspected": sentences.SUSPECTED.lower() + clock,
+        "expected": [*_expected(answer), *_worst(answer)] if answer.title else (),
+        "copies": (copies := _copies(answer) if answer.title else []),
+        "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "missing": _not_there(copies),
-    }
-
-
-def _clock(answer: Answer) -> str:
-    """Return that times of the instrument are its own where those of the law are shifted."""
-    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
-    return "; times on the instrument's clock" if timed and answer.shift_factors else ""
+        "behind": _unbroken(answer.alternative),
+        "next_test": _unbroken(answer.next_test),
+    }  # fmt: skip
 
 
 def _said(one: Constant) -> str:
@@ -273,15 +229,15 @@ def _said(one: Constant) -> str:
 def _expected(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of expected errors; quantities that nothing is known of share one."""
     found: list[dict[str, Any]] = []
-    for name, symbol in SYMBOLS.items():
+    for name, symbol in sentences.SYMBOLS.items():
         one = answer.expected(name)
         row = {
             "symbol": symbol,
-            "inside": _in_cell(expected(one, "inside")),
-            "beyond": _in_cell(expected(one, "beyond")),
+            "inside": _in_cell(sentences.expected(one, "inside")),
+            "beyond": _in_cell(sentences.expected(one, "beyond")),
             "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
             "known": one.is_known,
-            "note": _unbroken(note(answer, name)),
+            "note": _unbroken(sentences.note(answer, name)),
         }
         if found and not one.is_known and found[-1] == row | {"symbol": found[-1]["symbol"]}:
             found[-1]["symbol"] += f", {symbol}"
@@ -292,25 +248,27 @@ def _expected(answer: Answer) -> list[dict[str, Any]]:
 
 def _worst(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of the run that is missed most, if it is, and of the best classical law."""
-    told = [] if (worst := worst_run(answer)) is None else [("worst run in range", *worst)]
+    told = (
+        [] if (worst := sentences.worst_run(answer)) is None else [("worst run in range", *worst)]
+    )
     if answer.best_classical is not None:
         near, error = answer.best_classical
-        told.append((CLASSICAL.lower(), near, percent_of(error)))
+        told.append((sentences.CLASSICAL.lower(), near, percent_of(error)))
     return [
-        {"symbol": symbol, "note": _unbroken(note), "inside": _in_cell(error), "beyond": "",
+        {"symbol": symbol, "note": _unbroken(said), "inside": _in_cell(error), "beyond": "",
          "beyond_at": "", "known": True}
-        for symbol, note, error in told
+        for symbol, said, error in told
     ]  # fmt: skip
 
 
-def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
+def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
     """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
     title = effect_title(one.effect)
-    if one.amplitude is None or not separable:
-        return title, "", "" if separable else NOT_SEPARABLE, ""
-    note = one.amplitude.meaning if one.amplitude.unit == "%" else ""
-    note = note if one.is_established else "; ".join(filter(None, [note, "may be zero"]))
-    return title, note, _in_cell(one.amplitude.number), _in_cell(one.amplitude.interval)
+    if one.amplitude is None or not has_size:
+        return title, "", "" if has_size else sentences.NOT_SEPARABLE, ""
+    said = one.amplitude.meaning if one.amplitude.unit == "%" else ""
+    said = said if one.is_established else "; ".join(filter(None, [said, "may be zero"]))
+    return title, said, _in_cell(one.amplitude.number), _in_cell(one.amplitude.interval)
 
 
 def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
@@ -420,19 +378,19 @@ def _formulas(lines: Sequence[str]) -> str:
 
 def _law(equation: Equation, rest: bool = False) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
-    modes = len(equation.modulus)
+    count = len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
-        law = law_element(
-            equation.terms, equation.linear_relaxation, equation.named, modes, solvent, rest
+        text = law_element(
+            equation.terms, equation.linear_relaxation, equation.named, count, solvent, rest
         )
         # what a state of the whole fluid does stands below the law of a mode
-        index = "_k" if modes > 1 else ""
+        index = "_k" if count > 1 else ""
         parts = [
             one.equation.replace("_k", index) + _at_rest(one.states, part.own)
             for one, part in zip(equation.spelled_states, equation.states, strict=True)
         ]
-        return law + _formulas(parts)
+        return text + _formulas(parts)
     except InputError:  # nobody said how a law of their own is written
         return ""
 
