@@ -23,13 +23,7 @@ from discover.equations.formats.rheotool import DENSITY
 from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.laws.registry import LAWS
-from discover.loop.by_quantity import (
-    errors_by_quantity,
-    normal_stress_settled,
-    of_fitted,
-    of_stress,
-    with_unseen,
-)
+from discover.loop import by_quantity
 from discover.loop.fitted_range import range_of
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.run_record import RunRecord
@@ -92,9 +86,9 @@ def loop_answer(result: Any) -> Answer:
         result.error_after.fit,
         result.noise_floor,
         result.verdict in EXPLAINED,
-        with_unseen(result),
+        by_quantity.with_unseen(result),
         range_of(result.records, equation),
-        errors_by_quantity(result),
+        by_quantity.errors_by_quantity(result),
         following,
         tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         failed=_failed(result),
@@ -160,7 +154,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
-    left = of_fitted(result.records, result.error_after.fit, result.noise_floor)
+    left = by_quantity.of_fitted(result.records, result.error_after.fit, result.noise_floor)
     answer = Answer(
         material.title,
         material.law,
@@ -170,7 +164,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
         fits_to_the_noise=to_noise,
         discrepancy=None if to_noise else left,
         range=found,
-        expected_error={"sigma12": of_stress(result)},
+        expected_error={"sigma12": by_quantity.of_stress(result)},
         next_test=following,
         failed=_failed(result),
         tolerance=result.tolerance,
@@ -287,7 +281,7 @@ def shows_a_derivative(result: Any) -> bool:
     """
     seen = [(r.flow, r.quantity) for r in result.records if not r.held_out]
     other = any(flow != "shear" or quantity in ("N1", "N2") for flow, quantity in seen)
-    return other or normal_stress_settled(result)
+    return other or by_quantity.normal_stress_settled(result)
 
 
 def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[Constant]:

@@ -18,15 +18,8 @@ from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
+from discover.loop import final_model
 from discover.loop.expected_errors import spread_of_laws
-from discover.loop.final_model import (
-    Bounds,
-    augmented_fluid,
-    declared_effects,
-    declared_law,
-    declared_parameters,
-    states_of,
-)
 from discover.loop.loop_result import LoopResult
 from discover.loop.measured_rates import instants_found
 from discover.loop.parts import (
@@ -71,7 +64,7 @@ class Ended(Path):
     """What is reported of a posterior: constants, stages, rankings, what is left."""
 
     @cached_property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> final_model.Bounds:
         """95 % intervals of all that is free in the likeliest hypothesis, by position."""
         found = {}
         for at in self.fit.free:
@@ -345,10 +338,10 @@ def result_of(
     problem, theta = ended.posterior.problem, ended.theta
     declared, model, by_mode = problem.declared, problem.model, ended.by_mode
     present = [*ended.fit.names, *(known.name for known in declared.effects)]
-    fluid = augmented_fluid(model, theta, present)
-    states = states_of(model, theta, present)
+    fluid = final_model.augmented_fluid(model, theta, present)
+    states = final_model.states_of(model, theta, present)
     whole = bool(by_mode) or states != ()
-    own = declared_parameters(declared, theta, ended.bounds)
+    own = final_model.declared_parameters(declared, theta, ended.bounds)
     of_law = {name: one for name, one in by_mode.items() if name in own}
     # only what is fitted of a known effect has an interval
     free = {at: ends for at, ends in ended.bounds.items() if at in model.free_positions}
@@ -367,8 +360,8 @@ def result_of(
         rankings=ended.rankings(),
         records=tuple(ended.records),
         declared_parameters=own | of_law,
-        declared_effects=declared_effects(model, theta, free, by_mode),
-        declared_law=declared_law(declared, theta, of_law),
+        declared_effects=final_model.declared_effects(model, theta, free, by_mode),
+        declared_law=final_model.declared_law(declared, theta, of_law),
         explanations=ended.explanations,
         next_tests=tests,
         laws=laws,

@@ -3,18 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
+from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.parts import Stage
 from discover.loop.run_record import RunRecord
-from discover.words import (
-    FIGURE_SYMBOLS,
-    effect_title,
-    effects_title,
-    percent_of,
-    significant,
-)
 
 MOST_NAMES = 3
 
@@ -88,10 +82,10 @@ def what_to_measure_next(result: Any) -> str:
         return told
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
-    check, title = _as_clause(doubtful.check), effect_title(doubtful.effect)
+    check, title = _as_clause(doubtful.check), words.effect_title(doubtful.effect)
     if not doubtful.aliases:
         return f"To confirm {title}, {check}."
-    others = several([*map(effect_title, doubtful.aliases)])
+    others = several([*map(words.effect_title, doubtful.aliases)])
     return f"To distinguish {title} from {others}, {check}."
 
 
@@ -102,7 +96,7 @@ def _fastest(records: Sequence[RunRecord]) -> str:
     fastest = max(records, key=lambda record: record.fastest)
     at = fastest.temperature_C
     place = "" if fastest.shift == 1.0 or at is None else f" and {degrees(at)}"
-    return f"{significant(fastest.unshifted.fastest, 2)} 1/s{place}"
+    return f"{words.significant(fastest.unshifted.fastest, 2)} 1/s{place}"
 
 
 def _as_clause(check: str) -> str:
@@ -116,7 +110,7 @@ def _of_the_instrument(result: Any) -> str:
     first = next(iter(suspected(result)), None)
     if first is None:
         return ""
-    return f"To confirm {effect_title(first.effect)}, {_as_clause(first.check)}."
+    return f"To confirm {words.effect_title(first.effect)}, {_as_clause(first.check)}."
 
 
 def _of_another_stress(result: Any) -> str:
@@ -132,7 +126,7 @@ def _of_another_stress(result: Any) -> str:
         if apart is None or not result.tolerance < apart <= MUCH:
             continue
         if _is_in_reach(result, kind):
-            apart_by = f"equally good laws differ by {percent_of(apart)}"
+            apart_by = f"equally good laws differ by {words.percent_of(apart)}"
             return f"{title} at {_fastest(_sheared(result))}: {apart_by}."
     return ""
 
@@ -194,11 +188,11 @@ def _telling_test(result: Any) -> str:
     best = following.best
     if best is None:
         return ""
-    titles = [effects_title(effects) for effects in following.explanations]
+    titles = [words.effects_title(effects) for effects in following.explanations]
     first, *_ = best.pairs
     chosen = first[0]
     others = several([titles[j] for i, j in best.pairs if i == chosen])
-    what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
+    what = f" ({words.FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
     title = f"{best.title[:1].upper()}{best.title[1:]}"
     if any(record.shift != 1.0 for record in result.records):
         title += f", reduced to {reduced_to(result)}"

@@ -31,7 +31,7 @@ from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, s
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
 from discover.study.run_folder import RunFolder
-from discover.words import FIGURE_SYMBOLS, effect_title, listed, p_value, significant
+from discover.words import effect_title, listed, p_value, significant
 
 
 def write_loop(
@@ -80,7 +80,6 @@ def write_loop(
         noise_range=noise_range(result),
         inclusion=inclusion(result),
         kinds=KINDS,
-        symbols=FIGURE_SYMBOLS,
         remaining=remaining_rows(result),
         small_faults=SMALL_FAULTS,
         readings=[

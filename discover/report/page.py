@@ -15,6 +15,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 
+from discover import words
 from discover._version import __version__
 from discover.answer import Answer, Constant, Suspect, sentences
 from discover.answer import modes_in_words as modes
@@ -30,16 +31,6 @@ from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import parameter_name, percent, percent_range
 from discover.statistics.noise.noise_model import rms
-from discover.words import (
-    effect_title,
-    effects_title,
-    estimate,
-    interval,
-    listed,
-    percent_of,
-    readable,
-    significant,
-)
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -105,10 +96,10 @@ def _environment() -> Environment:
     environment.filters.update(
         percent=percent,
         percent_range=percent_range,
-        significant=significant,
-        interval=interval,
-        estimate=estimate,
-        readable=readable,
+        significant=words.significant,
+        interval=words.interval,
+        estimate=words.estimate,
+        readable=words.readable,
         subscripts=_subscripts,
         explained=_explained,
         # a name of a file may break behind an underscore
@@ -121,14 +112,16 @@ def _environment() -> Environment:
         formula=formula,
         safe_name=safe_name,
         parameter_name=parameter_name,
-        effect_title=effect_title,
-        effects_title=effects_title,
+        effect_title=words.effect_title,
+        effects_title=words.effects_title,
         rms=rms,
         term_element=term_element,
         learner_title=learner_title,
         quantities=in_words,
     )
-    environment.globals.update(answer_sentences=sentences, modes=modes)
+    environment.globals.update(
+        answer_sentences=sentences, modes=modes, symbols=words.FIGURE_SYMBOLS
+    )
     return environment
 
 
@@ -191,7 +184,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     reduced = modes.reduced_to(answer)
     shifted = [
         ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)} than at {reduced}",
-         significant(one, 3), "") for at, one in modes.shifts(answer)
+         words.significant(one, 3), "") for at, one in modes.shifts(answer)
     ]  # fmt: skip
     timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
     clock = "; times on the instrument's clock" if timed and answer.shift_factors else ""
@@ -253,7 +246,7 @@ def _worst(answer: Answer) -> list[dict[str, Any]]:
     )
     if answer.best_classical is not None:
         near, error = answer.best_classical
-        told.append((sentences.CLASSICAL.lower(), near, percent_of(error)))
+        told.append((sentences.CLASSICAL.lower(), near, words.percent_of(error)))
     return [
         {"symbol": symbol, "note": _unbroken(said), "inside": _in_cell(error), "beyond": "",
          "beyond_at": "", "known": True}
@@ -263,7 +256,7 @@ def _worst(answer: Answer) -> list[dict[str, Any]]:
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
     """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
-    title = effect_title(one.effect)
+    title = words.effect_title(one.effect)
     if one.amplitude is None or not has_size:
         return title, "", "" if has_size else sentences.NOT_SEPARABLE, ""
     said = one.amplitude.meaning if one.amplitude.unit == "%" else ""
@@ -277,7 +270,7 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
     if not grey:
         return ""
     reason = grey[0]["reason"].partition(". ")[0].rstrip(".").rpartition(": ")[2]
-    names = listed([one["name"] for one in grey])
+    names = words.listed([one["name"] for one in grey])
     if any(one["name"] in reason for one in grey):
         return f"{reason}."
     return f"Cannot be exported to {names}: {reason[:1].lower()}{reason[1:]}."

@@ -8,13 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from discover.dataset.importing import folder_files
 from discover.dataset.importing.files import blocks_of_importer
-from discover.dataset.importing.folder_files import (
-    files_of,
-    left_out,
-    nothing,
-    unread_columns,
-)
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName
 from discover.dataset.importing.names import alternatives
@@ -151,13 +146,13 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
         f"warning: --unit {key} changes nothing: no test that was read needs {key}."
         for key in sorted(of_units - all_.asked_for - _WAVES)
     )
-    files, notes = files_of(all_.records)
+    files, notes = folder_files.files_of(all_.records)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
     same = {key: of[0] for key, of in names.items() if len(of) == 1}
     tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
-    units, unread = units_taken_as_si(all_.units), unread_columns(all_.columns)
+    units, unread = units_taken_as_si(all_.units), folder_files.unread_columns(all_.columns)
     said = [*units, *idle, *all_.said, *unread, *notes]
     return ImportedFolder(files, mapping.model_copy(update=used), said, all_.unread)
 
@@ -206,7 +201,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             why = made.notes[0] if none else _not_at(made, readings, one, mapping, chosen)
             if none or why:
                 reasons += [f"block {number} is {why}"] if why else []
-                found.said.append(left_out(where, block, why))
+                found.said.append(folder_files.left_out(where, block, why))
             else:
                 made.name = name
                 found.records.append(made)
@@ -230,7 +225,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
     if unread := [shown(name) for name in there if name not in read]:
         found.columns.append((", ".join(unread), file))
     if not found.records:
-        raise InputError(" ".join(found.unread) or nothing(path, tables, reasons))
+        raise InputError(" ".join(found.unread) or folder_files.nothing(path, tables, reasons))
     return found
 
 

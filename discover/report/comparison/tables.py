@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from discover import words
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import Rival
@@ -23,15 +24,6 @@ from discover.report.wording import (
     sentence,
     terms_text,
     worst,
-)
-from discover.words import (
-    FIGURE_SYMBOLS,
-    estimate,
-    interval,
-    listed,
-    percent_of,
-    readable,
-    significant,
 )
 
 
@@ -112,8 +104,9 @@ def laws_fitted(comparison: Comparison) -> dict[str, Any]:
         {
             "law": fit.title,
             "constants": ", ".join(
-                f"{readable(name)} = {estimate(value, fit.ci95[name])} ({interval(fit.ci95[name])})"
+                f"{words.readable(name)} = {words.estimate(value, ends)} ({words.interval(ends)})"
                 for name, value in fit.parameters.items()
+                for ends in [fit.ci95[name]]
             ),
             "number": len(fit.parameters),
             "misfit": fit.misfit,
@@ -219,14 +212,14 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 def _inner(who: str, term: RecoveredTerm) -> Iterator[str]:
     for key, value in term.inner.items():
-        ends = f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else ""
+        ends = f" ({words.interval(term.inner_ci95[key])})" if key in term.inner_ci95 else ""
         yield f"{who}: {_equals(key, value)}{ends}"
     for key, (value, *ends) in term.inner_at_one.items():
-        yield f"{who}, if the coefficient is one: {_equals(key, value)} ({interval(ends)})"
+        yield f"{who}, if the coefficient is one: {_equals(key, value)} ({words.interval(ends)})"
 
 
 def _equals(name: str, value: float) -> str:
-    return f"{readable(name)} = {significant(value)}"
+    return f"{words.readable(name)} = {words.significant(value)}"
 
 
 def physics_checks(comparison: Comparison) -> dict[str, list[Mapping[str, Any] | None]]:
@@ -268,7 +261,7 @@ def rival_row(rival: Rival, comparison: Comparison) -> dict[str, Any]:
         # it stands above the sentence
         "reason": _LAW_SPELLED.sub("It ", rival.reason),
         "errors": rival.errors_to_chosen,
-        "separated": f"{FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
+        "separated": f"{words.FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
         f"{titles.get(place['protocol'], place['protocol'])}"
         if place
         else "nothing that was tried",
@@ -297,11 +290,11 @@ def _parts(comparison: Comparison, name: str, outcome: LearnerOutcome) -> Iterat
     yield from _unseen(comparison, name)
     apart = {q: off for q, off in comparison.disagreement.items() if off > _DIFFERS}
     if name == "tbnn_ude" and apart:
-        told = [f"{readable(q)} by {percent_of(off)}" for q, off in apart.items()]
-        yield f"it differs from the posterior in {listed(told)}"
+        told = [f"{words.readable(q)} by {words.percent_of(off)}" for q, off in apart.items()]
+        yield f"it differs from the posterior in {words.listed(told)}"
     checks = (comparison.physics.get(name) or {}).get("checks", ())
     if failed := [check["name"] for check in checks if check["passed"] is False]:
-        yield f"it fails {listed(failed)}"
+        yield f"it fails {words.listed(failed)}"
 
 
 def _of_learner(comparison: Comparison, name: str, outcome: LearnerOutcome) -> str:
@@ -314,7 +307,7 @@ def _of_learner(comparison: Comparison, name: str, outcome: LearnerOutcome) -> s
         if not outcome.terms:
             return f"{who} projects on no term{missed}"
         largest = max(outcome.terms, key=lambda term: abs(term.coefficient))
-        coefficient = f"{significant(largest.coefficient)} {readable(largest.term)}"
+        coefficient = f"{words.significant(largest.coefficient)} {words.readable(largest.term)}"
         return f"{who} projects mostly on {coefficient}{missed}"
     share = comparison.shares.get(name, 0.0)
     chance = f" (probability {percent(share)})" if share else ""
@@ -335,10 +328,10 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
             if (value := worst(errors, quantity)) is not None
         ]
         if said:
-            parts.append(f"{listed(said)} {where}")
+            parts.append(f"{words.listed(said)} {where}")
     told = []
     if parts:
         told.append(f"{learner_as_subject(name)} misses unseen flows: {'; '.join(parts)}")
     if lost:
-        told.append(f"{learner_as_subject(name)} diverges in {listed(lost)}")
+        told.append(f"{learner_as_subject(name)} diverges in {words.listed(lost)}")
     return told
