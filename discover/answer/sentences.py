@@ -6,14 +6,13 @@ from typing import Any
 from discover.answer import modes_in_words as modes
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
+# Words of the first lines, and constants that they name where these allow it
 _MOST_WORDS, _MOST_CONSTANTS = 60, 3
-"""Words of the first lines, and constants that they name where these allow it."""
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
 
-_USELESS = 0.25
-"""Relative discrepancy beyond which a law is of no use for any prediction."""
+_USELESS = 0.25  # Relative discrepancy beyond which a law is of no use for any prediction
 
 A_TRANSIENT = (
     "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."

@@ -26,24 +26,16 @@ from discover.statistics.noise.noise_model import rms
 
 Kind = Literal["yield_stress", "viscous", "solid"]
 
-_FEWEST = 6
-"""Samples from which on a law of three constants can be recognised."""
-
+_FEWEST = 6  # Samples from which on a law of three constants can be recognised
+# BIC by which it must lead laws that relax: strong evidence [Kass & Raftery 1995, JASA 90, 773]
 _AHEAD = 6.0
-"""BIC by which it must lead laws that relax: strong evidence
-[Kass & Raftery 1995, JASA 90, 773]."""
-
+# Largest relative misfit of a law that is named, by what was imposed
 _MISFIT = {"steady": 0.1, "oscillation": 0.05, "rate": 0.05}
-"""Largest relative misfit of a law that is named, by what was imposed."""
-
-_STANDS_OUT = 4.0
-"""Standard errors by which a yield stress or a modulus must exceed zero."""
-
+_STANDS_OUT = 4.0  # Standard errors by which a yield stress or a modulus must exceed zero
+# Share of the smallest stress that a yield stress must be, to be measured and not extrapolated
 _SEEN = 0.3
-"""Share of the smallest stress that a yield stress must be, to be measured and not extrapolated."""
-
+# Relaxation time times the slowest rate, up to which a first Newtonian plateau is in the range
 _PLATEAU = 3.0
-"""Relaxation time times the slowest rate, up to which a first Newtonian plateau is in the range."""
 
 Values = Float[np.ndarray, " k"]
 
@@ -306,6 +298,7 @@ def _stands_out(law: str, fit: _Fit, runs: Sequence[Run]) -> bool:
 
 # words --------------------------------------------------------------------------------------------
 
+# What a material is, its name for readers, and its constants with their units
 _NAMES: dict[str, tuple[Kind, str, dict[str, str]]] = {
     "newtonian": ("viscous", "viscous fluid (Newtonian)", {"viscosity_Pa_s": "Pa s"}),
     "herschel_bulkley": (
@@ -324,7 +317,6 @@ _NAMES: dict[str, tuple[Kind, str, dict[str, str]]] = {
         "solid", "solid (Kelvin–Voigt)", {"elastic_modulus_Pa": "Pa", "viscosity_Pa_s": "Pa s"},
     ),
 }  # fmt: skip
-"""What a material is, its name for readers, and its constants with their units."""
 
 _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
     "newtonian": lambda v: rf"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {v[0]}",
@@ -367,6 +359,7 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
 }
 
 
+# rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]
 _RHEOTOOL: dict[str, tuple[str, dict[str, str]]] = {
     "newtonian": ("Newtonian", {"eta": "viscosity"}),
     # k has the dimensions of a viscosity there, its rate being counted in 1/s
@@ -377,10 +370,8 @@ _RHEOTOOL: dict[str, tuple[str, dict[str, str]]] = {
         {"eta0": "viscosity", "etaInf": "viscosity", "k": "time", "n": "number", "a": "number"},
     ),
 }
-"""rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]."""
 
-_CAPS = {"herschel_bulkley": "eta0", "power_law": "etaMax"}
-"""Entry of a largest viscosity."""
+_CAPS = {"herschel_bulkley": "eta0", "power_law": "etaMax"}  # Entry of a largest viscosity
 
 
 def material_of(

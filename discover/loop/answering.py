@@ -37,14 +37,10 @@ from discover.words import (
     significant,
 )
 
-_MOST_ADDED = 2
-"""Effects added to a law, up to which their sum is told as that law with these."""
-
-_SETTLED = 0.95
-"""Probability from which on nothing is said of other laws."""
-
+_MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
+_SETTLED = 0.95  # Probability from which on nothing is said of other laws
+# Misfit over the change from sample to sample up to which a simple material leaves only noise
 _TO_NOISE = 1.5
-"""Misfit over the change from sample to sample up to which a simple material leaves only noise."""
 
 LAW_OF_EFFECT = {
     "giesekus_mobility": "giesekus",
@@ -206,9 +202,9 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
     return f"{', '.join(said)}{maximum}", near.size
 
 
+# Constant above which the flow curve of each mode has a maximum   [Giesekus 1982, J. Non-Newtonian
+# Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255].
 _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
-"""Constant above which the flow curve of each mode has a maximum   [Giesekus 1982, J.
-Non-Newtonian Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255]."""
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -312,8 +308,7 @@ def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     return replace(first, meaning="; ".join(filter(None, [first.said, told]))), *others
 
 
-_SURE = 1000
-"""Odds from which on more say no more."""
+_SURE = 1000  # Odds from which on more say no more
 
 
 def _constants(

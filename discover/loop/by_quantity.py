@@ -18,11 +18,9 @@ from discover.words import listed, percent_of
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
 
-_APART = 0.2
-"""Relative difference between laws from which on a quantity is not determined."""
-
+_APART = 0.2  # Relative difference between laws from which on a quantity is not determined
+# Relative difference between laws that is told of a quantity that nothing tested
 _WORTH_SAYING = 0.05
-"""Relative difference between laws that is told of a quantity that nothing tested."""
 
 FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
@@ -156,8 +154,7 @@ def _second_difference(result: Any, differ: str) -> ExpectedError:
     return ExpectedError(note=f"{share} by this law")
 
 
-_NOTHING = 1e-3
-"""N2 over N1 that rounding of the integration leaves."""
+_NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
 
 
 def normal_stress_settled(result: Any) -> bool:

@@ -39,11 +39,9 @@ from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of
 
 _DRAWS = 2000
-_FREE = 3
-"""Degree of constants that are free in each mode."""
-
+_FREE = 3  # Degree of constants that are free in each mode
+# Half width of an interval over the prior's, from which on the runs tell nothing of a mode
 _FEWEST_TOLD = 0.5
-"""Half width of an interval over the prior's, from which on the runs tell nothing of a mode."""
 
 
 def _at_ends(

@@ -37,8 +37,7 @@ from discover.words import counted
 MOST_LISTED = 8
 """Explanations that are listed by default."""
 
-_OFF = 1e-30
-"""Factor on the moduli of a fluid that is switched off."""
+_OFF = 1e-30  # Factor on the moduli of a fluid that is switched off
 
 
 @in_one_thread

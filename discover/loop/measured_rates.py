@@ -25,13 +25,11 @@ from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.whiteness import separate_probability
 from discover.words import percent_of
 
-_LEAST = 5e-3
-"""Scatter over the size of the rate, below which the stress hardly tells it from none."""
-
+_LEAST = 5e-3  # Scatter over the size of the rate, below which the stress hardly tells it from none
 _FEWEST = 24
 _SEEMS_NOISE = 0.01
+# Of log likelihood, from which on smooth rates are believed: twenty times as likely
 _LIKELIER = 3.0
-"""Of log likelihood, from which on smooth rates are believed: twenty times as likely."""
 
 
 def smoothed(run: Run) -> Run:
@@ -91,8 +89,7 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
     )
 
 
-_MOST = 40
-"""Steps whose instants are fitted, at most: each costs a constant."""
+_MOST = 40  # Steps whose instants are fitted, at most: each costs a constant
 
 
 def with_rate_steps(run: Run) -> Run:

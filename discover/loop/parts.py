@@ -28,13 +28,10 @@ class ErrorPair:
     held_out: float | None
 
 
+# Factor above the value from which on an interval tells nothing: two decades, beyond which records
+# tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163].
 _OPEN = 100.0
-"""Factor above the value from which on an interval tells nothing: two decades, beyond which records
-tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163]."""
-
-_DECADE = 10.0
-"""The same on both sides."""
-
+_DECADE = 10.0  # The same on both sides
 _ROUNDING = 1e-9
 
 

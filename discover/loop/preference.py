@@ -29,11 +29,9 @@ from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 
-_MOST = 8
-"""Laws of each kind with a name, the likeliest, that are fitted without each run."""
-
+_MOST = 8  # Laws of each kind with a name, the likeliest, that are fitted without each run
+# Log of odds against the best down to which runs left out do not exclude a law
 _AS_WELL = float(np.log(0.05))
-"""Log of odds against the best down to which runs left out do not exclude a law."""
 
 
 @in_one_thread

@@ -25,8 +25,7 @@ MOST_SAMPLES = 400
 
 _FEWEST_ASKED = 10
 _FEWEST_KEPT = 150
-_RESOLVED = 1e-3
-"""Relative error that the noise of as many samples as are used may leave."""
+_RESOLVED = 1e-3  # Relative error that the noise of as many samples as are used may leave
 
 
 def split_runs(

@@ -155,19 +155,16 @@ def _is_in_reach(result: Any, kind: str) -> bool:
     return thick and rate <= _FASTEST_EXTENSION
 
 
+# Extension rate in 1/s that rheometers do not exceed [Sentmanat 2004, Rheol. Acta 43, 657].
 _FASTEST_EXTENSION = 30.0
-"""Extension rate in 1/s that rheometers do not exceed [Sentmanat 2004, Rheol. Acta 43, 657]."""
-
+# Tensile stress over rate in Pa s below which a strip does not keep its shape until it is drawn:
+# instruments for extension at a given rate take melts   [Sentmanat 2004]
 _LEAST_TENSILE_VISCOSITY = 1e3
-"""Tensile stress over rate in Pa s below which a strip does not keep its shape until it is drawn:
-instruments for extension at a given rate take melts   [Sentmanat 2004]."""
-
+# N1 in Pa below which no rheometer tells it: axial transducers resolve some 1e-3 N, and N1 is
+# 2F/(πR²) on a cone of R = 25 mm   [Macosko 1994, Rheology, ch. 8].
 _LEAST_NORMAL_STRESS = 1.0
-"""N1 in Pa below which no rheometer tells it: axial transducers resolve some 1e-3 N, and N1 is
-2F/(πR²) on a cone of R = 25 mm   [Macosko 1994, Rheology, ch. 8]."""
-
+# Stresses that tell laws apart which agree in σ12, the easier measurement first
 _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
-"""Stresses that tell laws apart which agree in σ12, the easier measurement first."""
 
 
 def _by_geometry(result: Any) -> str:

@@ -15,12 +15,9 @@ from discover.loop.runs import why_untested
 from discover.loop.task import Task
 from discover.statistics.residual import fast_part
 
+# Effect that is all that such a material has; another law stands for itself
 _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
-"""Effect that is all that such a material has; another law stands for itself."""
-
-_ALREADY = ("saramito",)
-"""Laws that hold a yield stress themselves."""
-
+_ALREADY = ("saramito",)  # Laws that hold a yield stress themselves
 _AS_WELL = 1.1
 
 

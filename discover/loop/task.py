@@ -37,9 +37,7 @@ Say = Callable[[str], None]
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
 
-_AT_END = 1e-3
-"""Share of its range within which a constant stands at an end."""
-
+_AT_END = 1e-3  # Share of its range within which a constant stands at an end
 _DIVERGES = "its stress diverges. Check its parameters, modes and units."
 
 

@@ -130,13 +130,10 @@ _UNTESTED = {
     "no_effect_needed": "Fitted, not tested: with its constants fitted your model describes",
 }
 
-_ALIKE = 0.05
-"""Probability of a law from which on these runs do not exclude it."""
-
+_ALIKE = 0.05  # Probability of a law from which on these runs do not exclude it
 _MEASURED = {"flows": "what was measured", "states": "the states that were measured"}
 
-_SLOW = 0.5
-"""Correlation from which noise and a slow effect look alike for some samples on end."""
+_SLOW = 0.5  # Correlation from which noise and a slow effect look alike for some samples on end
 
 
 def loop_verdict(result: LoopResult) -> list[str]:
@@ -286,10 +283,11 @@ def inclusion(result: LoopResult) -> str:
 _MOST_INCLUDED = 8
 
 
+# Last words of what is a share of the root-mean-square stress
 _SHARES = ("error", "floor", "gain", "clock")
-"""Last words of what is a share of the root-mean-square stress."""
 
 
+# What is said of the residual, for those who do not read the JSON
 _REMAINING = {
     "structured": "systematic residual",
     "error": "error on the fitted runs",
@@ -311,7 +309,6 @@ _REMAINING = {
     "loading deviation": "assumed scatter of loading, relative",
     "description": "summary",
 }
-"""What is said of the residual, for those who do not read the JSON."""
 
 
 def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:

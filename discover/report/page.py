@@ -57,8 +57,8 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
     }
 
 
+# Characters of a file that a page carries; more would make the page slow to open
 _MOST_INSIDE = 3_000_000
-"""Characters of a file that a page carries; more would make the page slow to open."""
 
 
 def render(template: str, data: Mapping[str, str] | None = None, **content: Any) -> str:
@@ -166,8 +166,8 @@ def attempt(title: str, draw: Callable[[], Part]) -> Part | Missing:
         return Missing(title, f"{type(error).__name__}, {text}" if text else type(error).__name__)
 
 
+# Buttons, with the formats that they copy; JSON is that of the answer
 _COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
-"""Buttons, with the formats that they copy; JSON is that of the answer."""
 
 
 def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
@@ -356,8 +356,7 @@ def _rounded(equation: Equation, answer: Answer) -> Equation:
     return replace(equation, terms=terms, named=named)
 
 
-_LARGE = 15.0
-"""Size in points of an equation that the answer rests on."""
+_LARGE = 15.0  # Size in points of an equation that the answer rests on
 
 
 def _formulas(lines: Sequence[str]) -> str:

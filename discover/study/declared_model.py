@@ -25,8 +25,8 @@ from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Model, Study
 from discover.words import counted, percent_of
 
+# Longest runs, and slowest modes, within which a declared elastic constant does not relax
 _UNRELAXED = 1e3
-"""Longest runs, and slowest modes, within which a declared elastic constant does not relax."""
 
 MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 """Constants of the modes that may be left to be fitted."""
@@ -234,8 +234,8 @@ def _law_of_each_mode(
     return law_of_each_mode(laws)
 
 
+# Relative difference of relaxation times that were written to a file and read again
 _SAME_MODES = 1e-6
-"""Relative difference of relaxation times that were written to a file and read again."""
 
 
 def _spectrum_of(

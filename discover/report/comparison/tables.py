@@ -268,11 +268,8 @@ def rival_row(rival: Rival, comparison: Comparison) -> dict[str, Any]:
     }
 
 
-_MOST_TERMS = 4
-"""More are a table and no sentence."""
-
-_DIFFERS = 0.05
-"""Relative difference between network and posterior that is told."""
+_MOST_TERMS = 4  # More are a table and no sentence
+_DIFFERS = 0.05  # Relative difference between network and posterior that is told
 
 
 def learner_lines(comparison: Comparison) -> list[str]:

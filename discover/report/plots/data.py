@@ -16,9 +16,7 @@ from discover.report.plots.loop.runs import THOUSANDS, shortened
 from discover.report.wording import percent
 from discover.words import FIGURE_SYMBOLS, counted
 
-_MOST_RUNS = 24
-"""Panels of runs, beyond which a page is too long to look through."""
-
+_MOST_RUNS = 24  # Panels of runs, beyond which a page is too long to look through
 _POINTS: dict[str, Any] = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.9}
 _MOST_POINTS = 300
 

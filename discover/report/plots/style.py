@@ -80,8 +80,7 @@ _LEARNER_STYLES: dict[str, dict[str, Any]] = {
     "tensor_sindy": {"color": SPARSE, "linestyle": "--", "linewidth": 1.8},
     "tbnn_ude": {"color": NETWORK, "linestyle": ":", "linewidth": 2.2},
 }
-_OTHERS = (PURPLE, YELLOW, GREEN)
-"""Colours of learners of users' own, in their order."""
+_OTHERS = (PURPLE, YELLOW, GREEN)  # Colours of learners of users' own, in their order
 
 CHOSEN_STYLE: dict[str, Any] = {"color": SPARSE, "linestyle": "-"}
 RIVAL_STYLES: tuple[dict[str, Any], ...] = (
@@ -362,8 +361,8 @@ def make_logarithmic(axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+# Ratio of the ends of a logarithmic axis below which decades alone do not say where one is
 _FEW_DECADES = 20.0
-"""Ratio of the ends of a logarithmic axis below which decades alone do not say where one is."""
 
 
 def make_percentage(axis) -> None:

@@ -119,8 +119,7 @@ def high_deborah_picture(comparison: Comparison) -> look.Picture | None:
 
 _STRONGEST = 0.55  # more would drown the number in the cell
 _TOLD = 10.0  # a larger relative error is no more than that in a cell
-_LOWEST, _HIGHEST = 1e-4, 1.0
-"""Relative errors at which the colour of a cell begins and ends."""
+_LOWEST, _HIGHEST = 1e-4, 1.0  # Relative errors at which the colour of a cell begins and ends
 
 Cells = Mapping[tuple[float, float], float | None]
 
