@@ -49,10 +49,7 @@ class Spread:
 def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     """Return by how much σ12, N1, N2 and uniaxial stress differ between equally good laws.
 
-    See `weighed_laws`.
-
-    `posterior`: what the runs say. `best`: the law that is reported, from which differences are
-    counted.
+    These are `weighed_laws`. `best`: the law that is reported, from which differences are counted.
     """
     runs = posterior.problem.fitted.runs
     weighed = weighed_laws(posterior)

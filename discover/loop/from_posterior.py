@@ -327,11 +327,9 @@ def result_of(
     spikes: Mapping[str, Sequence[float]],
     of_rates: str,
 ) -> LoopResult:
-    """Return the result of a loop.
+    """Return the result of a loop; `spikes`, `of_rates` as `Task` has them.
 
-    `ended`: the posterior that it ended with. `laws`: those that the declared one was chosen from.
-    `spikes`: times of samples set aside as outliers, by run. `of_rates`: that rates were read with
-    noise which the fluid did not feel, in words; empty where not.
+    `laws`: those that the declared one was chosen from.
     """
     problem, theta = ended.posterior.problem, ended.theta
     declared, model, by_mode = problem.declared, problem.model, ended.by_mode

@@ -146,8 +146,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     def without_answer(self) -> Equation:
         """Return the augmented fluid as an equation, with the box in which it was tested.
 
-        Raises InputError if an effect gives the fluid a state that nobody wrote out, or adds what
-        is no sum of library terms, or if what it adds differs from mode to mode.
+        Raises InputError as `equation`.
         """
         fluid = self.fluid_at_mean if self.fluid is None else self.fluid
         if self.material is not None:

@@ -63,8 +63,6 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
 
     Every simple term of the library is fitted at either rate: a law too flexible to be believed
     tells which of them the fluid felt.
-
-    `declared`: the model to start from. `runs`: that are fitted.
     """
     smooth = [smoothed(run) for run in runs]
     scatter = [

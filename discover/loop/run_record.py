@@ -100,10 +100,9 @@ def record_runs(
     held_out: bool,
     order: Sequence[str] = (),
 ) -> list[RunRecord]:
-    """Return each run with the predictions of several models.
+    """Return each run with the predictions of several models, which are padded.
 
-    `runs`, `predictions`: the runs, and what each model predicts of them, padded. `held_out`:
-    whether no fit saw them. `order`: names of the runs of the data set, in its order.
+    `order`: names of the runs of the data set, in its order.
     """
     records = []
     for i, run in enumerate(runs):

@@ -163,11 +163,7 @@ _LEAST = 0.15  # Share of a part's expected time that is still told of it once t
 
 
 class ComparisonTime:
-    """Progress of a comparison.
-
-    `most`, `several_modes`, `held_out`, `clock`, `crowding`: as for `SearchTime`. `compiled`: share
-    of programs that have to be compiled.
-    """
+    """Progress of a comparison; parameters as of `SearchTime`."""
 
     def __init__(
         self,

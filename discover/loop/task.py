@@ -304,10 +304,8 @@ def further_candidates(
 ) -> list[AbstractEffect]:
     """Return the effects that are asked for and that the declared model does not know.
 
-    `effects`: as `candidates_of` takes them. `runs`: those that are fitted and those that judge.
-
-    Raises InputError if they are not as `candidates_of` takes them, an effect by mode is neither
-    declared nor among them, or the rates of the runs contain a known effect already.
+    Raises InputError as `candidates_of`, or if an effect by mode is neither declared nor among
+    them, or the rates of the runs, fitted or held out, contain a known effect already.
     """
     candidates = candidates_of(effects)
     known = {effect.name for effect in declared.effects}

@@ -45,11 +45,8 @@ def write_loop(
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
-    `name`, `summary`: title, and the data and declared model in words. `study_text`: the study
-    file, shown at the end. `run`: what the page says of the run that made it, where that was no
-    command. `conditions`: material and temperature, for the title.
-
-    Returns the page.
+    Returns the page. `summary`: the data and declared model in words. `run`: what the page says of
+    the run that made it, where that was no command. `conditions`: material and temperature.
     """
     pictures = [
         waterfall_picture(result),

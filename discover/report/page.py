@@ -66,9 +66,8 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
 
     Everything is escaped except pictures and mathematics that this package wrote itself.
 
-    `template`: file in ``templates``. `data`: text of files that each picture links to, by name.
-    The page carries those that are not too long, so that it hands them out where it stands alone;
-    the others lie in its folder. `content`: its variables.
+    `data`: text of files that each picture links to, by name. The page carries those that are not
+    too long, so that it hands them out where it stands alone; the others lie in its folder.
     """
     carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (
@@ -155,8 +154,6 @@ def attempt(title: str, draw: Callable[[], Part]) -> Part | Missing:
     A report comes after minutes or hours of computing, and its numbers lie in JSON already. No
     fault of one picture or table is worth the rest of the page. The logger of this module has the
     traceback, at level debug.
-
-    `title`: the part, as the subject of a sentence. `draw`: makes it.
     """
     try:
         return draw()

@@ -41,10 +41,8 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
 
     Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` are the 95 % band of the
     posterior; the sparse law has it where the quantity is determined, else NaN, as has ``measured``
-    where nothing was.
-    A law that cannot be integrated through a flow has no line there.
-
-    `comparison`: flows over which only errors are mapped are left out.
+    where nothing was. Flows over which only errors are mapped are left out, and a law has no line
+    in a flow that it cannot be integrated through.
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}

@@ -95,10 +95,7 @@ def declared_fluid(base: Any, data: Dataset) -> StudyModel:
 
 
 def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
-    """Return the study that would ask for the same with files.
-
-    `asked`: sections of it besides ``[data]``. `where`: the call, as an error names it.
-    """
+    """Return the study that would ask for the same with files: `asked`, besides ``[data]``."""
     source: dict[str, Any] = {"folder": data.name or "data in memory"}
     if isinstance(data, SyntheticDataset) and data.truth is not None:
         found = name_of(data.truth.law)

@@ -119,13 +119,11 @@ def write_comparison(
 ) -> Path:
     """Write ``comparison.json``, ``predictions.csv``, ``equations.tex``, the figures and the page.
 
-    The numbers come first. A picture or a table that cannot be drawn then costs its own place on
-    the page and nothing else.
+    Returns the page. The numbers come first: a picture or a table that cannot be drawn then costs
+    its own place on the page and nothing else.
 
-    `linear_relaxation`: whether −σ was part of the known law. `study_text`: the study file, shown
-    at the end. `run`: what the page says of the run that made it, where that was no command.
-
-    Returns the page.
+    `linear_relaxation`: whether −σ was part of the known law. `run`: what the page says of the run
+    that made it, where that was no command.
     """
     content = json_text(comparison.to_json())
     folder.write("comparison.json", content)

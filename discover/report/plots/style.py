@@ -207,8 +207,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
 
     The figure is not pyplot's: a notebook that writes a report keeps its own pictures and backend.
 
-    `rows`, `columns`: number of panels. `width`, `height`: of the whole figure and of one row, in
-    inches.
+    `width`, `height`: of the whole figure and of one row, in inches.
     """
     with only_settings(_SETTINGS):
         drawing = Figure(figsize=(width, height * rows), layout="constrained")
@@ -219,10 +218,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
 def panels_of(
     count: int, columns: int = 4, width: float = 9.0, height: float = 2.6
 ) -> Iterator[tuple]:
-    """Yield a figure, its axes, and as many panels as are asked for; those left over are hidden.
-
-    `count`, `columns`: number of panels, and how many stand side by side at most.
-    """
+    """Yield a figure, its axes, and `count` panels, so many side by side; the rest are hidden."""
     columns = min(columns, count)
     with figure(-(-count // columns), columns, width, height) as (drawing, axes):
         for panel in axes.ravel()[count:]:
@@ -342,10 +338,8 @@ def runs_through_decades(
 ) -> bool:
     """Whether logarithmic time is the natural axis: decades of it, at one rate or sampled so.
 
-    A rate that was measured rises before it is constant; samples that crowd at early times say the
-    same.
-
-    `times`, `shear_rate`: of one run, in s and 1/s.
+    A rate in 1/s that was measured rises before it is constant; samples that crowd at early times,
+    in s, say the same.
     """
     positive = times[times > 0]
     if not positive.size or positive[-1] <= _DECADES * positive[0]:
@@ -406,9 +400,6 @@ def shade_between(
 
     There a fill between the curves as a whole would shade the inside of a loop and a bar where it
     begins and ends, and not what the band sweeps.
-
-    `panel`: axes of matplotlib. `along`, `low`, `high`: where the curves stand, and the curves,
-    shape (n,). `style`: of the shade, as for `matplotlib.axes.Axes.fill_between`.
     """
     if np.all(np.diff(along) >= 0.0):
         panel.fill_between(along, low, high, **style)

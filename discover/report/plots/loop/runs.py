@@ -128,11 +128,9 @@ def draw_run(
     panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples,
     names: tuple[str, str] = (AS_DECLARED, WITH_EFFECTS),
 ) -> None:  # fmt: skip
-    """Draw the measured stress, the law as declared and with effects in one run.
+    """Draw the measured stress, the law as declared and with effects against what is given.
 
-    `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
-    `shown`: which samples are marked as measured, and between which the models are drawn. `names`:
-    as in `drawn_runs`.
+    `marked`, `shown`: which samples are marked as measured, and between which models are drawn.
     """
     colour = HELD_COLOUR if record.held_out else FIT_COLOUR
     if record.band is not None:
