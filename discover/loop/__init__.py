@@ -6,7 +6,7 @@ from discover.inference.engine.free_functions import FreeForm
 from discover.loop.loop import run_loop, run_loop_on_each
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import CandidateScore, ErrorPair, Stage, StageParameter
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 
 __all__ = [
     "CandidateScore",

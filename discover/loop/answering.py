@@ -26,7 +26,7 @@ from discover.laws.registry import LAWS
 from discover.loop import by_quantity
 from discover.loop.fitted_range import range_of
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import (
     effect_title,

@@ -11,7 +11,7 @@ from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
 from discover.answer.sentences import MEASURED_AT, MUCH
 from discover.loop.fitted_range import by_temperature
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.words import listed, percent_of
 

@@ -8,7 +8,7 @@ import numpy as np
 from discover.answer import Range
 from discover.equations import Equation
 from discover.equations.equation import flow_numbers
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 
 # Share of the largest rate that a flow reaches in the other direction, if it oscillates
 _TURNS = 0.5

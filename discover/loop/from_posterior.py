@@ -32,8 +32,7 @@ from discover.loop.parts import (
     end_of_range,
 )
 from discover.loop.path import Path
-from discover.loop.run_record import errors_of
-from discover.loop.runs import why_untested
+from discover.loop.runs import errors_of, why_untested
 from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
 from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of

@@ -30,7 +30,7 @@ from discover.loop import parts
 from discover.loop.answering import loop_answer
 from discover.loop.expected_errors import Spread
 from discover.loop.reading import Reading, read_residual
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.plain_numbers import json_text, plain
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 from scipy.stats import permutation_test, rankdata
 
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.words import p_value, percent_of
 
 HARMONICS = 5

@@ -8,7 +8,7 @@ from discover.answer.modes_in_words import degrees, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.parts import Stage
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 
 MOST_NAMES = 3
 

@@ -10,8 +10,7 @@ from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.inference.engine.inelastic import Inelastic
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
-from discover.loop.run_record import RunRecord, errors_of, record_runs
-from discover.loop.runs import why_untested
+from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
 from discover.statistics.residual import fast_part
 

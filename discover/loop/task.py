@@ -28,8 +28,7 @@ from discover.laws.registry import starting_values
 from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
-from discover.loop.run_record import errors_of
-from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.runs import MOST_SAMPLES, errors_of, require_samples, split_runs
 from discover.words import unknown_name
 
 Say = Callable[[str], None]

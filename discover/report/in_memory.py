@@ -16,7 +16,7 @@ from discover.errors import InputError
 from discover.fitting import NamedLawFit
 from discover.learners.run_prediction import RunPrediction
 from discover.loop.loop_result import LoopResult
-from discover.loop.run_record import record_runs
+from discover.loop.runs import record_runs
 from discover.plain_numbers import json_text
 from discover.report.comparison.report import write_comparison
 from discover.report.loop import write_loop

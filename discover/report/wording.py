@@ -11,8 +11,6 @@ from discover.loop import FreeForm
 from discover.loop.parts import ConstantByMode, StageParameter
 from discover.protocols.kinematics import MODULI
 
-SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
-
 
 def recorded_symbol(quantities: Iterable[str]) -> str:
     """Return the symbol of what is recorded, or ``modulus`` or ``stress`` for several kinds."""
