@@ -18,9 +18,8 @@ from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
 from discover.effects.registry import parameters_of
-from discover.equations import Equation, law_parts
+from discover.equations import AugmentedLaw, Equation, law_parts
 from discover.equations.formats.rheotool import DENSITY
-from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.loop import by_quantity

@@ -12,9 +12,8 @@ from discover.inference.engine import Posterior
 from discover.inference.engine.fit import Fit
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
-from discover.protocols import FlowProtocol, in_flow, start_up
+from discover.protocols import FlowProtocol, in_flow, shear_rates, start_up
 from discover.protocols.kinematics import RecordedQuantity
-from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms
 
 _LAWS, _DRAWS = 20, 4

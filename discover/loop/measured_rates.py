@@ -15,8 +15,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.dataset.run_table import wave_of
 from discover.effects import simplest_terms
-from discover.forward.augmented_model import AugmentedModel
-from discover.forward.declared import DeclaredModel
+from discover.forward import AugmentedModel, DeclaredModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.problem import Problem
 from discover.protocols import another_between_samples, sampled_rate

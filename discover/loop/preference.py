@@ -14,8 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.answer.naming import named_law
-from discover.equations import Equation
-from discover.equations.parts import StatePart
+from discover.equations import Equation, StatePart
 from discover.errors import InputError
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy

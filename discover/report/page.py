@@ -20,8 +20,7 @@ from discover._version import __version__
 from discover.answer import Answer, Constant, Suspect, sentences
 from discover.answer import modes_in_words as modes
 from discover.effects import StateEffect
-from discover.equations import Equation
-from discover.equations.files import FORMATS
+from discover.equations import FORMATS, Equation
 from discover.equations.spelling.markup import law_element, term_element
 from discover.errors import InputError
 from discover.learners.registry import learner_title

@@ -9,18 +9,15 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.dataset import Dataset, LinearSweep
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset import Dataset, LinearSweep, RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.run import SLOWEST_RATE, Run
 from discover.effects import ConstitutiveEffect, KnownEffect, known_effects
 from discover.equations import AugmentedLaw, Equation
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.laws.each_mode import law_of_each_mode
-from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_value
-from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Model, Study
 from discover.words import counted, percent_of

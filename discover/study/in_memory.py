@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discover.dataset import Dataset, Run
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
+from discover.dataset import Dataset, RelaxationSpectrum, Run
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects

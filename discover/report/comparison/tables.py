@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from discover import words
-from discover.comparison.comparison import Comparison
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison import Comparison, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
 from discover.equations.spelling.markup import law_element, term_element, term_mathml

@@ -7,9 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.ticker import EngFormatter
 
-from discover.dataset.dataset import Dataset
-from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
-from discover.dataset.run import Run
+from discover.dataset import Dataset, LinearSweep, RelaxationSpectrum, Run
 from discover.dataset.run_table import run_line
 from discover.report.plots import style as look
 from discover.report.plots.loop.runs import THOUSANDS, shortened

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from discover.loop import RunRecord
-from discover.loop.loop_result import LoopResult
+from discover.loop import LoopResult, RunRecord
 from discover.loop.reading import oscillation
 from discover.protocols.kinematics import MODULI
 from discover.report.plots import style as look
