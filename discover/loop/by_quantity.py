@@ -86,7 +86,10 @@ def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
         }
     else:
         found = dict(result.left_out)
-        found |= {record.name: _missed(record, result) for record in _held_inside(result)}
+        found |= {
+            record.name: beyond_noise(float(record.errors[-1]), result.noise_floor)
+            for record in _held_inside(result)
+        }
     own = {record.name for record in result.records if not kind or _is(record, kind)}
     return {name: error for name, error in found.items() if name in own}
 
@@ -104,10 +107,6 @@ def _held_inside(result: Any) -> list[RunRecord]:
         and record.fastest <= FASTER * fastest
         and np.isfinite(record.errors[-1])
     ]
-
-
-def _missed(record: RunRecord, result: Any) -> float:
-    return beyond_noise(float(record.errors[-1]), result.noise_floor)
 
 
 def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
@@ -172,12 +171,10 @@ def differing(result: Any, kind: str) -> float | None:
 
 def of_stress(result: Any) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
-    fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
-    held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
-    fast = [r for r in held if r.fastest > FASTER * fastest]
     errors = unseen_errors(result, "sigma12")
-    inside, at = _mean([*errors.values()]), _measured_at(fast)
-    beyond = _mean([_missed(r, result) for r in fast])
+    inside = _mean([*errors.values()])
+    own = measured(result.records, "sigma12", result.noise_floor) or ExpectedError()
+    beyond, at = own.beyond, own.beyond_at
     spread = result.spread_of_laws.get("sigma12")
     if beyond is None and spread is not None and spread.beyond is not None:
         beyond, at = max(spread.beyond, inside or 0.0), _TWICE
