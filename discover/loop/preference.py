@@ -49,7 +49,12 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if any(has_name(posterior, known[0][0]) for has_name in of_the_field):
         return posterior
     leading = [fit for fit, _ in known]
-    _finish_laws(posterior)
+    # the likeliest laws with a name are fitted to the end that the search gave up, as far behind
+    search = posterior.search
+    given_up = (f for f in search.found.values() if f.root is None and np.isfinite(f.log_posterior))
+    some = sorted(given_up, key=lambda fit: -fit.log_posterior)
+    laws = islice((fit for fit in some if law_of(posterior, fit)), _MOST)
+    search.add([search.fitter.start(fit.names, fit.theta, fit.linear) for fit in laws])
     alive = posterior.search.alive()
     classical, thixotropic = (
         list(islice((fit for fit in alive if has_name(posterior, fit)), _MOST))
@@ -74,15 +79,6 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
         left=Discrepancy(fitter, chosen, smallest(posterior.search, chosen)),
         by_left_out=tuple((some[i], float(weights[i])) for i in order),
     )
-
-
-def _finish_laws(posterior: Posterior) -> None:
-    """Fit the likeliest laws with a name to the end that the search gave up, as far behind."""
-    search = posterior.search
-    given_up = (f for f in search.found.values() if f.root is None and np.isfinite(f.log_posterior))
-    some = sorted(given_up, key=lambda fit: -fit.log_posterior)
-    laws = islice((fit for fit in some if law_of(posterior, fit)), _MOST)
-    search.add([search.fitter.start(fit.names, fit.theta, fit.linear) for fit in laws])
 
 
 def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:

@@ -63,19 +63,16 @@ def split_runs(
             "fewer samples."
         )
     spikes: dict[str, list[float]] = {}
-    fitted_runs, held_runs = (
-        [
-            thin_run(run, _needed(run, most))
-            for run in _without_spikes(
-                cut_to_strain(
-                    [without_held_values(with_rate_steps(run)) for run in part.runs], strain
-                ),
-                spikes,
-            )
-        ]
-        for part in (fitted, held)
-    )
-    return fitted_runs, held_runs, spikes
+
+    def prepared(runs: Sequence[Run]) -> Iterator[Run]:
+        stepped = [without_held_values(with_rate_steps(run)) for run in runs]
+        for run in cut_to_strain(stepped, strain):
+            left, times = without_spikes(run)
+            if times:
+                spikes[run.name] = times
+            yield thin_run(left, _needed(left, most))
+
+    return list(prepared(fitted.runs)), list(prepared(held.runs)), spikes
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
@@ -117,15 +114,6 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
             )
         cut.append(run.window(keep))
     return cut
-
-
-def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:
-    """Give the runs without the samples that stand alone in them, whose times are noted."""
-    for run in runs:
-        left, times = without_spikes(run)
-        if times:
-            spikes[run.name] = times
-        yield left
 
 
 def _needed(run: Run, most: int) -> int:
@@ -259,6 +247,10 @@ def record_runs(
         predicted = predictions[:, i, : len(run)]
         size = rms(run.recorded)
         misfit = np.sqrt(np.mean((predicted - run.recorded) ** 2, axis=1))
+        conditions = {k: float(v) for k, v in run.metadata.items() if not isinstance(v, str)}
+        conditions.pop("n_points", None)  # of the file, not of the experiment
+        if run.name in order:
+            conditions["the order of the runs"] = float(list(order).index(run.name))
         records.append(
             RunRecord(
                 name=run.name,
@@ -270,7 +262,7 @@ def record_runs(
                 measured=run.recorded,
                 predicted=predicted,
                 errors=misfit / (size if size > 0 else 1.0),
-                conditions=_conditions(run, order),
+                conditions=conditions,
                 flow=run.flow,
                 quantity=run.quantity,
                 control=run.protocol.control,
@@ -284,11 +276,3 @@ def errors_of(records: Sequence[RunRecord], index: int) -> ErrorPair:
     fitted = [r.errors[index] for r in records if not r.held_out]
     held = [r.errors[index] for r in records if r.held_out]
     return ErrorPair(float(np.mean(fitted)), float(np.mean(held)) if held else None)
-
-
-def _conditions(run: Run, order: Sequence[str]) -> dict[str, float]:
-    numbers = {k: float(v) for k, v in run.metadata.items() if not isinstance(v, str)}
-    numbers.pop("n_points", None)  # of the file, not of the experiment
-    if run.name in order:
-        numbers["the order of the runs"] = float(list(order).index(run.name))
-    return numbers

@@ -7,7 +7,6 @@ from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
-from discover.loop.parts import Stage
 from discover.loop.runs import RunRecord
 
 MOST_NAMES = 3
@@ -76,8 +75,12 @@ def what_to_measure_next(result: Any) -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return _of_the_instrument(result) or _of_another_stress(result) or _by_geometry(result)
-    doubtful = _most_doubtful(result.stages)
+        if own := suspected(result):  # of the instrument
+            return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
+        return _of_another_stress(result) or _by_geometry(result)
+    # the stage to confirm first: one with aliases before one without
+    with_aliases = [stage for stage in result.stages if stage.aliases]
+    doubtful = next(iter([*with_aliases, *result.stages]), None)
     if (doubtful is None or not doubtful.aliases) and (told := _of_predicted_n1(result)):
         return told
     if doubtful is None:
@@ -103,14 +106,6 @@ def _as_clause(check: str) -> str:
     """Return the check of an effect as it goes on in a sentence; N2 keeps its capital."""
     check = check.rstrip(". ")
     return check if check[1:2].isdigit() else check[:1].lower() + check[1:]
-
-
-def _of_the_instrument(result: Any) -> str:
-    """Return how to check what is suspected of the instrument; empty where nothing is."""
-    first = next(iter(suspected(result)), None)
-    if first is None:
-        return ""
-    return f"To confirm {words.effect_title(first.effect)}, {_as_clause(first.check)}."
 
 
 def _of_another_stress(result: Any) -> str:
@@ -194,9 +189,3 @@ def _telling_test(result: Any) -> str:
     if any(record.shift != 1.0 for record in result.records):
         title += f", reduced to {reduced_to(result)}"
     return f"{title}{what}: it should distinguish {titles[chosen]} from {others}."
-
-
-def _most_doubtful(stages: Sequence[Stage]) -> Stage | None:
-    """Return the stage to confirm first: one with aliases before one without."""
-    with_aliases = [stage for stage in stages if stage.aliases]
-    return next(iter([*with_aliases, *stages]), None)

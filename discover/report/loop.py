@@ -153,14 +153,10 @@ def what_was_found(result: LoopResult) -> str:
         parts.append(free_form_sentence(result.free_form[0]))
     if result.laws:
         parts.append(_law_chosen(result.laws))
-    return sentence([_how_it_stands(result), *parts])
-
-
-def _how_it_stands(result: LoopResult) -> str:
-    """Return the verdict in words."""
+    stands = _LOOP[result.verdict] if doubted(result) is None else _OPEN
     if untested := untested_by(result):
-        return f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
-    return _LOOP[result.verdict] if doubted(result) is None else _OPEN
+        stands = f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
+    return sentence([stands, *parts])
 
 
 def _law_chosen(laws: Sequence[LawFit]) -> str:

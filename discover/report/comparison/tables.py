@@ -117,11 +117,14 @@ def laws_fitted(comparison: Comparison) -> dict[str, Any]:
     for name, outcome in comparison.outcomes.items():
         errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
         left = comparison.lack_of_fit.get(name)
+        number = outcome.details.get("n_constants")  # None of a learner that does not say
+        if outcome.learner == "tensor_sindy":
+            number = sum(1 + len(term.inner) for term in outcome.terms)
         rows.append(
             {
                 "law": learner_title(name),
                 "constants": "",
-                "number": _number_of_constants(outcome),
+                "number": number,
                 "misfit": None if left is None else left.misfit,
                 "criterion": None,
                 **_mean_errors(errors, placed),
@@ -129,13 +132,6 @@ def laws_fitted(comparison: Comparison) -> dict[str, Any]:
         )
     judged = placed.values()
     return {"rows": rows, "inside": True in judged, "beyond": False in judged}
-
-
-def _number_of_constants(outcome: LearnerOutcome) -> int | None:
-    """Return how many numbers of a law were fitted; None of a learner that does not say."""
-    if outcome.learner == "tensor_sindy":
-        return sum(1 + len(term.inner) for term in outcome.terms)
-    return outcome.details.get("n_constants")
 
 
 def _mean_errors(

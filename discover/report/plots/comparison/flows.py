@@ -54,6 +54,9 @@ def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
     strain = look.about_middle(flow.strain, last)[last]
     closed = {"elastic": (strain, "strain γ"), "viscous": (flow.rate[last], rate_label)}
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
+    seen = "no learner saw this flow."
+    if flow.name in {one.name for one in comparison.flows_of("training")}:
+        seen = "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
     with look.figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
             for label, style, stresses in curves(comparison, flow):
@@ -80,7 +83,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
         return look.picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_seen(comparison, flow)} "
+            f"{flow.title}: {seen} "
             "Left, stresses against time; beyond the times shaded grey the prediction runs past "
             "the length of the training series. Middle and right, the last cycle against strain "
             "and against shear rate. Shaded in orange is the 95 % band of all laws "
@@ -93,6 +96,9 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> look.Picture:
     """Return σ12, N1 and N2 in start-up, or else what was recorded, such as the strain of creep."""
     stress_unit, _, _ = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
+    seen = "no learner saw this flow."
+    if all(one.oscillatory for one in comparison.flows_of("training")):
+        seen = "a kind of flow that training, all oscillatory, did not contain."
     with look.figure(1, len(quantities), height=2.9) as (drawing, axes):
         shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
         if not flow.is_truth:
@@ -112,7 +118,7 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> look.Picture:
         return look.picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}.",
+            f"{flow.title}: {seen} It lies {comparison.placement(flow).text}.",
         )
 
 
@@ -155,19 +161,6 @@ def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Fig
         look.label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units_of, strict=True)])
         look.legend_above(drawing, axes)
         yield drawing
-
-
-def _seen(comparison: Comparison, flow: Flow) -> str:
-    if flow.name in {f.name for f in comparison.flows_of("training")}:
-        return "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
-    return "no learner saw this flow."
-
-
-def _new_kind(comparison: Comparison) -> str:
-    """Return how a start-up differs from the flows fitted."""
-    if all(flow.oscillatory for flow in comparison.flows_of("training")):
-        return "a kind of flow that training, all oscillatory, did not contain."
-    return "no learner saw this flow."
 
 
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
