@@ -8,17 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from discover.dataset.importing import folder_files
+from discover.dataset.importing import folder_files, quantities
 from discover.dataset.importing.files import blocks_of_importer
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName
 from discover.dataset.importing.names import alternatives
 from discover.dataset.importing.oscillations import waves_of
-from discover.dataset.importing.quantities import (
-    UnsaidUnits,
-    require_units,
-    units_taken_as_si,
-)
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
@@ -72,7 +67,7 @@ class _Found:
     seen: dict[tuple[str, str], None] = field(default_factory=dict)  # quantities and columns
     named: set[str] = field(default_factory=set)  # quantities that some block names
     asked_for: set[str] = field(default_factory=set)  # those that a test needs
-    units: UnsaidUnits = field(default_factory=list)
+    units: quantities.UnsaidUnits = field(default_factory=list)
     columns: list[tuple[str, str]] = field(default_factory=list)  # columns not read, and the file
 
     def note(self, readings: Readings, made: Record) -> None:
@@ -141,7 +136,7 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
             f"{unused[0]}. Known are {', '.join(sorted(all_.named))}; name another with "
             f'--column {unused[0]}="its name", or leave the unit out.'
         )
-    require_units(all_.units)
+    quantities.require_units(all_.units)
     idle = (
         f"warning: --unit {key} changes nothing: no test that was read needs {key}."
         for key in sorted(of_units - all_.asked_for - _WAVES)
@@ -152,7 +147,10 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
     same = {key: of[0] for key, of in names.items() if len(of) == 1}
     tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
-    units, unread = units_taken_as_si(all_.units), folder_files.unread_columns(all_.columns)
+    units, unread = (
+        quantities.units_taken_as_si(all_.units),
+        folder_files.unread_columns(all_.columns),
+    )
     said = [*units, *idle, *all_.said, *unread, *notes]
     return ImportedFolder(files, mapping.model_copy(update=used), said, all_.unread)
 

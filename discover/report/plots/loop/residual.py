@@ -9,15 +9,7 @@ from discover.loop import LoopResult
 from discover.loop.by_quantity import FASTER
 from discover.loop.parts import ConstantByMode
 from discover.report.plots import style as look
-from discover.report.plots.loop.runs import (
-    FIT_COLOUR,
-    HELD_COLOUR,
-    along_in_common,
-    axis_label,
-    models_of,
-    symbol_of,
-    through_decades,
-)
+from discover.report.plots.loop import runs
 from discover.report.wording import percent
 from discover.words import effect_title, listed, readable, significant
 
@@ -27,18 +19,20 @@ def residual_picture(result: LoopResult) -> look.Picture:
     records = [record for record in result.records if record.is_transient]
     only_states = not records
     records = records or list(result.records)
-    start_ups = only_states or all(map(through_decades, records))
+    start_ups = only_states or all(map(runs.through_decades, records))
     labels = (
-        (along_in_common(records), axis_label(records)) if only_states else ("time (s)", "strain")
+        (runs.along_in_common(records), runs.axis_label(records))
+        if only_states
+        else ("time (s)", "strain")
     )
-    models = models_of(records)
+    models = runs.models_of(records)
     with look.figure(len(models), 2, height=2.4) as (drawing, axes):
         for row, (stage, title) in enumerate(models):
             limit = 0.0
             for place, record in enumerate(records):
                 relative = 100.0 * record.relative_residual[stage]
                 style = {
-                    "color": HELD_COLOUR if record.held_out else FIT_COLOUR,
+                    "color": runs.HELD_COLOUR if record.held_out else runs.FIT_COLOUR,
                     "lw": 0.9,
                     "alpha": 0.8,
                     "label": "held out" if record.held_out else "fitted",
@@ -56,7 +50,7 @@ def residual_picture(result: LoopResult) -> look.Picture:
                 panel.set_xlabel(label if row == len(models) - 1 else "")
                 panel.axhline(0.0, color=look.INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
-            axes[row, 0].set_ylabel(f"residual (% of rms {symbol_of(records)})")
+            axes[row, 0].set_ylabel(f"residual (% of rms {runs.symbol_of(records)})")
             axes[row, 0].set_title(title, loc="left")
         look.legend_above(drawing, axes)
         return look.picture(
@@ -81,9 +75,11 @@ def waterfall_picture(result: LoopResult) -> look.Picture:
         positions = np.arange(len(labels))
         held_out = [p.held_out for p in pairs if p.held_out is not None]
         judged = len(held_out) == len(pairs)
-        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19 if judged else 0.0)]
+        series = [
+            ("fitted runs", runs.FIT_COLOUR, [p.fit for p in pairs], -0.19 if judged else 0.0)
+        ]
         if judged:
-            series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
+            series.append(("held-out runs", runs.HELD_COLOUR, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.barh(positions + shift, heights, 0.36, color=colour, label=label)
