@@ -19,9 +19,9 @@ Predictions = dict[tuple[str, str, str], dict[str, np.ndarray]]
 @contextmanager
 def without_pages() -> Iterator[None]:
     """Write JSON and predictions alone: to draw a page takes as long as to decide."""
+    from discover.report import loop as loop_report
     from discover.report import predictions as lines
     from discover.report.comparison import report as comparison_report
-    from discover.report.loop import report as loop_report
 
     def loop(result, folder, *_, **__):
         result.write_json(folder.path / "loop.json")

@@ -1,13 +1,13 @@
 """What is wrong in nested values that a user wrote, in the user's words."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from discover.errors import InputError, Problems, problems_in
-from discover.words import did_you_mean, nearest
+from discover.words import did_you_mean, nearest, unknown_name
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -58,6 +58,17 @@ class Section(BaseModel):
 
 def _as_tuple(value: Any) -> Any:
     return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
+
+
+def one_of(kind: str, known: Callable[[], Iterable[str]]) -> Callable[[str], str]:
+    """Return what checks that a name is known, and names the nearest where it is not."""
+
+    def check(name: str) -> str:
+        if name not in known():
+            raise ValueError(unknown_name(kind, name, known()))
+        return name
+
+    return check
 
 
 def validated(model: type[_Model], content: object, where: str) -> _Model:

@@ -38,11 +38,11 @@ def without_pictures(patch: pytest.MonkeyPatch) -> None:
 
     All pictures stand on the pages of `tests/report/test_reports.py` and `test_loop_report.py`.
     """
-    from discover.report.loop import report
+    from discover.report import loop
 
-    for name in vars(report):
+    for name in vars(loop):
         if name.endswith(("_picture", "_map")) and name != "by_mode_picture":
-            patch.setattr(report, name, lambda *_: None)
+            patch.setattr(loop, name, lambda *_: None)
     patch.setattr("discover.report.comparison.report.comparison_pictures", lambda *_: ([], []))
 
 

@@ -229,11 +229,10 @@ class Constant:
 _MINUS = "−"
 _OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
 _DECADE = 10.0
-_SMALL = 0.01
-"""Share of the largest of several values below which the least is none."""
-_NEAR_END = 0.1
-"""Share of an interval at its ends in which a value is not near its middle."""
+_SMALL = 0.01  # Share of the largest of several values below which the least is none
+_NEAR_END = 0.1  # Share of an interval at its ends in which a value is not near its middle
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
+# Symbol and meaning of constants that no effect has
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
     "relaxation_time_s": ("λ", "relaxation time"),
@@ -247,4 +246,3 @@ _SYMBOLS = {
     "viscosity_Pa_s": ("η", "viscosity"),
     "elastic_modulus_Pa": ("G", "modulus"),
 }
-"""Symbol and meaning of constants that no effect has."""

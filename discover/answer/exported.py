@@ -16,9 +16,8 @@ from discover.words import unknown_name
 def simple_material_text(folder: str | Path, form: str, density_kg_m3: float | None) -> str | None:
     """Return a yield-stress fluid, a viscous fluid or a solid as text; None for another law.
 
-    `folder`: what ``discover compare`` or ``discover close-loop`` wrote. `form`: ``python``,
-    ``latex``, ``rheotool`` or ``json``. Raises InputError if there is no result, it is damaged, or
-    the format has no such material.
+    `form`: ``python``, ``latex``, ``rheotool`` or ``json``. Raises InputError if there is no
+    result, it is damaged, or the format has no such material.
     """
     content, name = read_result(folder)
     use = content.get("use") if isinstance(content, dict) else None

@@ -11,8 +11,7 @@ from discover.laws.base import NamedLaw
 from discover.laws.registry import LAWS, starting_values
 from tensor_library.law_terms import LawTerm
 
-_SAME = 1e-6
-"""Relative deviation of coefficients up to which two laws are one."""
+_SAME = 1e-6  # Relative deviation of coefficients up to which two laws are one
 
 
 def named_law(equation: Equation) -> tuple[str, dict[str, float]] | None:

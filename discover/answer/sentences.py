@@ -3,25 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from discover.answer.modes_in_words import (
-    MOST_SHIFTS,
-    degrees,
-    is_plain,
-    reduced_to,
-    shifted,
-    short,
-    span,
-)
+from discover.answer import modes_in_words as modes
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
+# Words of the first lines, and constants that they name where these allow it
 _MOST_WORDS, _MOST_CONSTANTS = 60, 3
-"""Words of the first lines, and constants that they name where these allow it."""
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
 
-_USELESS = 0.25
-"""Relative discrepancy beyond which a law is of no use for any prediction."""
+_USELESS = 0.25  # Relative discrepancy beyond which a law is of no use for any prediction
 
 A_TRANSIENT = (
     "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
@@ -79,14 +70,14 @@ def _law(answer: Any, most: int) -> str:
     named = constants(certain[:most])
     if several and not answer.is_empirical:
         named.append(counted(len(answer.modes), "mode"))
-    elif answer.modes and not several and not own and not is_plain(answer):
+    elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     if answer.temperature_C is not None:
         # the rates of use are not at the one that times are reduced to
         what = "times referred to" if answer.shift_factors else "at"
-        named.append(f"{what} {degrees(answer.temperature_C)}")
+        named.append(f"{what} {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
 
@@ -234,22 +225,22 @@ def _place(answer: Any) -> str:
     In numbers without units where the modes have none.
     """
     one = answer.range
-    if is_plain(answer) and one.weissenberg is not None:
+    if modes.is_plain(answer) and one.weissenberg is not None:
         numeral = "λω" if one.oscillates else "λ/duration"
-        slow = "" if one.deborah is None else f", De = {numeral} = {span(one.deborah)}"
-        return f"Wi = λγ̇ ≤ {short(one.weissenberg[1])}{slow}"
+        slow = "" if one.deborah is None else f", De = {numeral} = {modes.span(one.deborah)}"
+        return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{slow}"
     if not one.by_temperature:
-        reduced = f" reduced to {reduced_to(answer)}" if answer.shift_factors else ""
+        reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
         return f"{rates}{reduced}" if (rates := _rates(one)) else ""
-    told = [f"{_rates(own)} at {degrees(at)}" for at, own in one.by_temperature.items()]
-    return listed(told) if len(told) <= MOST_SHIFTS else f"{told[0]} to {told[-1]}"
+    told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
+    return listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}"
 
 
 def _rates(one: Any) -> str:
     """Return the rates of a range, and the frequencies of what oscillates."""
-    found = [] if one.rate_1_s is None else [f"{span(one.rate_1_s)} 1/s"]
+    found = [] if one.rate_1_s is None else [f"{modes.span(one.rate_1_s)} 1/s"]
     if (frequencies := one.frequency_rad_s) is not None:
-        several = any(sign in (told := span(frequencies)) for sign in ("–", " to "))
+        several = any(sign in (told := modes.span(frequencies)) for sign in ("–", " to "))
         found.append(f"{'' if several else 'oscillating at '}{told} rad/s")
     return ", ".join(found)
 
@@ -346,6 +337,6 @@ def lines(answer: Any) -> list[str]:
     if answer.best_classical is not None:
         near, error = answer.best_classical
         found.append(f"{CLASSICAL}: {near}, error {percent_of(error)}.")
-    found += [shifted(answer), suspects(answer), answer.alternative]
+    found += [modes.shifted(answer), suspects(answer), answer.alternative]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

@@ -26,24 +26,16 @@ from discover.statistics.noise.noise_model import rms
 
 Kind = Literal["yield_stress", "viscous", "solid"]
 
-_FEWEST = 6
-"""Samples from which on a law of three constants can be recognised."""
-
+_FEWEST = 6  # Samples from which on a law of three constants can be recognised
+# BIC by which it must lead laws that relax: strong evidence [Kass & Raftery 1995, JASA 90, 773]
 _AHEAD = 6.0
-"""BIC by which it must lead laws that relax: strong evidence
-[Kass & Raftery 1995, JASA 90, 773]."""
-
+# Largest relative misfit of a law that is named, by what was imposed
 _MISFIT = {"steady": 0.1, "oscillation": 0.05, "rate": 0.05}
-"""Largest relative misfit of a law that is named, by what was imposed."""
-
-_STANDS_OUT = 4.0
-"""Standard errors by which a yield stress or a modulus must exceed zero."""
-
+_STANDS_OUT = 4.0  # Standard errors by which a yield stress or a modulus must exceed zero
+# Share of the smallest stress that a yield stress must be, to be measured and not extrapolated
 _SEEN = 0.3
-"""Share of the smallest stress that a yield stress must be, to be measured and not extrapolated."""
-
+# Relaxation time times the slowest rate, up to which a first Newtonian plateau is in the range
 _PLATEAU = 3.0
-"""Relaxation time times the slowest rate, up to which a first Newtonian plateau is in the range."""
 
 Values = Float[np.ndarray, " k"]
 
@@ -81,7 +73,7 @@ class SimpleMaterial:
             kind, names = _RHEOTOOL[self.law]
             entries = {
                 name: (quantity, one.value)
-                for (name, quantity), one in zip(names, self.constants, strict=True)
+                for (name, quantity), one in zip(names.items(), self.constants, strict=True)
             }
             if cap := _CAPS.get(self.law):
                 # rheoTool wants a largest viscosity: that of a tenth of the slowest rate
@@ -129,7 +121,8 @@ def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
     rival = min(_fit(law, runs).criterion for law in others)
     if chosen.criterion > rival - (_AHEAD if best == "herschel_bulkley" else 0.0):
         return None
-    return _material(best, chosen)
+    spread = np.exp(np.outer(chosen.quantile * chosen.deviation, (-1.0, 1.0)))
+    return material_of(best, chosen.values, chosen.values[:, None] * spread, chosen.error)
 
 
 def _is_simple(run: Run) -> bool:
@@ -152,7 +145,8 @@ def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
         storage = run.quantity == MODULI[0]
         omega = run.angular_frequency
         if law in ("maxwell", "two_modes"):
-            each = [_of_mode(omega * time, storage) * g for g, time in _modes(law, values)]
+            pairs = ((omega * time, g) for g, time in _modes(law, values))
+            each = [(x**2 if storage else x) / (1.0 + x**2) * g for x, g in pairs]
             whole = np.sum(each, axis=0)
             return whole if storage or law == "two_modes" else whole + values[2] * omega
         if storage:
@@ -176,10 +170,6 @@ def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
 def _modes(law: str, values: Values) -> list[tuple[float, float]]:
     pairs = [(values[0], values[1]), (values[2], values[3])] if law == "two_modes" else [values[:2]]
     return [(float(modulus), float(time)) for modulus, time in pairs]
-
-
-def _of_mode(x: np.ndarray, storage: bool) -> np.ndarray:
-    return (x**2 if storage else x) / (1.0 + x**2)
 
 
 def _strain(run: Run) -> Float[np.ndarray, " n"]:
@@ -308,35 +298,25 @@ def _stands_out(law: str, fit: _Fit, runs: Sequence[Run]) -> bool:
 
 # words --------------------------------------------------------------------------------------------
 
-_NAMES: dict[str, tuple[Kind, str, tuple[tuple[str, str], ...]]] = {
-    "newtonian": ("viscous", "viscous fluid (Newtonian)", (("viscosity_Pa_s", "Pa s"),)),
+# What a material is, its name for readers, and its constants with their units
+_NAMES: dict[str, tuple[Kind, str, dict[str, str]]] = {
+    "newtonian": ("viscous", "viscous fluid (Newtonian)", {"viscosity_Pa_s": "Pa s"}),
     "herschel_bulkley": (
-        "yield_stress",
-        "yield-stress fluid (Herschel–Bulkley)",
-        (("yield_stress_Pa", "Pa"), ("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
+        "yield_stress", "yield-stress fluid (Herschel–Bulkley)",
+        {"yield_stress_Pa": "Pa", "consistency_Pa_sn": "Pa sⁿ", "flow_index": "1"},
     ),
     "power_law": (
-        "viscous",
-        "viscous fluid (power law)",
-        (("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
+        "viscous", "viscous fluid (power law)", {"consistency_Pa_sn": "Pa sⁿ", "flow_index": "1"},
     ),
     "carreau_yasuda": (
-        "viscous",
-        "viscous fluid (Carreau–Yasuda)",
-        (
-            ("zero_shear_viscosity_Pa_s", "Pa s"),
-            ("infinite_shear_viscosity_Pa_s", "Pa s"),
-            ("critical_time_s", "s"),
-            ("flow_index", "1"),
-            ("sharpness", "1"),
-        ),
+        "viscous", "viscous fluid (Carreau–Yasuda)",
+        {"zero_shear_viscosity_Pa_s": "Pa s", "infinite_shear_viscosity_Pa_s": "Pa s",
+         "critical_time_s": "s", "flow_index": "1", "sharpness": "1"},
     ),
     "kelvin_voigt": (
-        "solid",
-        "solid (Kelvin–Voigt)",
-        (("elastic_modulus_Pa", "Pa"), ("viscosity_Pa_s", "Pa s")),
+        "solid", "solid (Kelvin–Voigt)", {"elastic_modulus_Pa": "Pa", "viscosity_Pa_s": "Pa s"},
     ),
-}
+}  # fmt: skip
 
 _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
     "newtonian": lambda v: rf"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {v[0]}",
@@ -379,34 +359,19 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
 }
 
 
-_RHEOTOOL: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
-    "newtonian": ("Newtonian", (("eta", "viscosity"),)),
+# rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]
+_RHEOTOOL: dict[str, tuple[str, dict[str, str]]] = {
+    "newtonian": ("Newtonian", {"eta": "viscosity"}),
     # k has the dimensions of a viscosity there, its rate being counted in 1/s
-    "herschel_bulkley": (
-        "HerschelBulkley",
-        (("tau0", "stress"), ("k", "viscosity"), ("n", "number")),
-    ),
-    "power_law": ("PowerLaw", (("k", "viscosity"), ("n", "number"))),
+    "herschel_bulkley": ("HerschelBulkley", {"tau0": "stress", "k": "viscosity", "n": "number"}),
+    "power_law": ("PowerLaw", {"k": "viscosity", "n": "number"}),
     "carreau_yasuda": (
         "CarreauYasuda",
-        (
-            ("eta0", "viscosity"),
-            ("etaInf", "viscosity"),
-            ("k", "time"),
-            ("n", "number"),
-            ("a", "number"),
-        ),
+        {"eta0": "viscosity", "etaInf": "viscosity", "k": "time", "n": "number", "a": "number"},
     ),
 }
-"""rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]."""
 
-_CAPS = {"herschel_bulkley": "eta0", "power_law": "etaMax"}
-"""Entry of a largest viscosity."""
-
-
-def _material(law: str, fit: _Fit) -> SimpleMaterial:
-    spread = np.exp(np.outer(fit.quantile * fit.deviation, (-1.0, 1.0)))
-    return material_of(law, fit.values, fit.values[:, None] * spread, fit.error)
+_CAPS = {"herschel_bulkley": "eta0", "power_law": "etaMax"}  # Entry of a largest viscosity
 
 
 def material_of(
@@ -420,7 +385,7 @@ def material_of(
     kind, title, names = _NAMES[law]
     constants = tuple(
         Constant(name, float(value), (float(low), float(high)), unit)
-        for (name, unit), value, (low, high) in zip(names, values, ci95, strict=True)
+        for (name, unit), value, (low, high) in zip(names.items(), values, ci95, strict=True)
     )
     latex = _LATEX[law]([f"{value:.6g}" for value in values])
     return SimpleMaterial(

@@ -103,7 +103,7 @@ def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progres
     """Close the loop on a study and write its report; a seed only changes synthetic noise."""
     from discover.dataset.run_table import material_and_temperature
     from discover.loop.loop import run_study
-    from discover.report.loop.report import write_loop
+    from discover.report.loop import write_loop
     from discover.study.data import load_study_data
     from discover.study.declared_model import declared_model
 

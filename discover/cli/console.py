@@ -66,7 +66,8 @@ def heard_or_not(stream: Any) -> Any:
 
 def say(text: str, err: bool = False) -> None:
     """Print lines that may quote files: without characters that a terminal would obey."""
-    typer.echo("\n".join(map(_plain, text.split("\n"))), err=err)
+    shown = (c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+    typer.echo("".join(shown), err=err)
 
 
 def say_error(message: str) -> None:
@@ -79,10 +80,6 @@ def say_error(message: str) -> None:
 def _one_line(text: str) -> str:
     words = (word if len(word) <= _LONGEST else f"{word[:_LONGEST]}…" for word in text.split())
     return " ".join(words)
-
-
-def _plain(line: str) -> str:
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 @contextmanager

@@ -15,13 +15,6 @@ data_app = typer.Typer(help="Import, check and draw data.", no_args_is_help=True
 FolderArgument = Annotated[
     str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
 ]
-NewFolderOption = Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")]
-
-
-def _required(out: Path | None) -> Path:
-    if out is None:
-        raise InputError("Say where the data folder goes: --out FOLDER.")
-    return out
 
 
 @data_app.command("list")
@@ -153,7 +146,7 @@ def import_data(
         list[Path] | None,
         typer.Argument(help="Exported files, with one or more tests in each, or a folder of them."),
     ] = None,
-    out: NewFolderOption = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     mapping: Annotated[
         Path | None, typer.Option("--mapping", help="TOML file with the options below.")
     ] = None,
@@ -219,7 +212,8 @@ def import_data(
     from discover.dataset.importing import import_files
     from discover.dataset.load import DATA_FILES
 
-    out = _required(out)
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
     layout = {
         "format": form, "delimiter": delimiter, "decimal": decimal, "header_row": header_row,
         "encoding": encoding,

@@ -38,11 +38,6 @@ TESTS_FILE = "tests.csv"
 DATA_FILES = (INDEX_FILE, SWEEP_FILE, *(f"{kind}.csv" for kind in TABLES))
 
 
-def folder_roots(base: str | Path | None = None) -> list[Path]:
-    """Return the folders in which a data folder is looked for, in their order."""
-    return [Path(root) for root in (base, os.environ.get(DATA_VARIABLE), ".") if root]
-
-
 def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     """Return the path of a data folder; InputError if there is none, or no data file in it.
 
@@ -59,7 +54,8 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
         path = Path(folder).expanduser()
     except RuntimeError:
         raise InputError(f"{said} names a user who is not known here.") from None
-    candidates = [path] if path.is_absolute() else [root / path for root in folder_roots(base)]
+    roots = [root for root in (base, os.environ.get(DATA_VARIABLE), ".") if root]
+    candidates = [path] if path.is_absolute() else [Path(root) / path for root in roots]
     # os.path answers False where Path raises: no permission, names too long, zero bytes
     for candidate in candidates:
         if any(os.path.isfile(candidate / name) for name in DATA_FILES):

@@ -139,7 +139,10 @@ class ModeSearch:
         amounts, _ = solved(self._design(grid, solvent, elastic), self._target)
         times = self._merged(grid, amounts[: len(grid)])
         while len(times) + elastic < fewest:
-            times = _split(times, self.bounds)
+            # one more, in the middle of the widest gap
+            places = np.concatenate([[low], times, [high]])
+            widest = int(np.argmax(np.diff(np.log(places))))
+            times = np.insert(times, widest, np.sqrt(places[widest] * places[widest + 1]))
         most = max((len(self.frequency) - solvent - elastic) // 2, fewest - elastic, 1)
         least = max(fewest - elastic, 0 if elastic else 1)
         while True:
@@ -239,13 +242,6 @@ class ModeSearch:
 def _mean(times: np.ndarray, weights: np.ndarray) -> float:
     weights = weights if np.sum(weights) > 0.0 else np.ones_like(times)
     return float(np.exp(np.average(np.log(times), weights=weights)))
-
-
-def _split(times: np.ndarray, bounds: tuple[float, float]) -> np.ndarray:
-    """Return times with one more, in the middle of the widest gap."""
-    places = np.concatenate([[bounds[0]], times, [bounds[1]]])
-    widest = int(np.argmax(np.diff(np.log(places))))
-    return np.insert(times, widest, np.sqrt(places[widest] * places[widest + 1]))
 
 
 def solved(design: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:

@@ -35,6 +35,11 @@ _COLUMNS = (
     *_NEEDED, "first_normal_stress_difference", "second_normal_stress_difference", "strain",
     "storage_modulus", "loss_modulus",
 )  # fmt: skip
+# of quantities that are no column's name
+_COLUMN_OF = {
+    "sigma12": "stress", "tensile_stress": "stress", "N1": "first_normal_stress_difference",
+    "N2": "second_normal_stress_difference",
+}  # fmt: skip
 
 
 def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[np.ndarray, " n"]:
@@ -197,13 +202,7 @@ class Run(NotebookView):
     @property
     def recorded(self) -> Float[np.ndarray, " n"]:
         """The values of that quantity, in Pa or dimensionless, shape (n,); InputError if none."""
-        values = {
-            "N1": self.first_normal_stress_difference,
-            "N2": self.second_normal_stress_difference,
-            "strain": self.strain,
-            "storage_modulus": self.storage_modulus,
-            "loss_modulus": self.loss_modulus,
-        }.get(self.quantity, self.stress)
+        values = getattr(self, _COLUMN_OF.get(self.quantity, self.quantity))
         if values is None:
             raise InputError(f"The run {self.name!r} has no {self.quantity}; it was not recorded.")
         return values
@@ -226,11 +225,8 @@ class Run(NotebookView):
     @property
     def beside(self) -> tuple[RecordedQuantity, ...]:
         """What was recorded next to σ12: N1, N2, both or neither."""
-        both: tuple[RecordedQuantity, ...] = ("N1", "N2")
-        columns = (self.first_normal_stress_difference, self.second_normal_stress_difference)
-        if self.quantity != "sigma12":
-            return ()
-        return tuple(q for q, values in zip(both, columns, strict=True) if values is not None)
+        both: tuple[RecordedQuantity, ...] = ("N1", "N2") if self.quantity == "sigma12" else ()
+        return tuple(one for one in both if getattr(self, _COLUMN_OF[one]) is not None)
 
     @property
     def records(self) -> "tuple[Run, ...]":

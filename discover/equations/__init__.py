@@ -1,8 +1,13 @@
 """Laws as they leave this package: SymPy, LaTeX, JSON, Python, UFL, rheoTool."""
 
 from discover.equations.equation import Box, Equation, HasEquation, Tested
-from discover.equations.files import FORMATS, read_result_laws, write_equation
-from discover.equations.formats.json_format import equation_from_json, equation_to_json
+from discover.equations.files import (
+    FORMATS,
+    equation_from_json,
+    equation_to_json,
+    read_result_laws,
+    write_equation,
+)
 from discover.equations.parts import (
     AugmentedLaw,
     NamedPart,

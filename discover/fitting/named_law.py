@@ -22,8 +22,7 @@ from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
 from discover.loop.path import records_of
-from discover.loop.run_record import RunRecord
-from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.runs import MOST_SAMPLES, RunRecord, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
 from discover.protocols.between_samples import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit

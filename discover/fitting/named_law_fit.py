@@ -19,7 +19,7 @@ from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS, Fluid
 from discover.loop.by_quantity import measured, of_fitted
 from discover.loop.fitted_range import range_of
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of

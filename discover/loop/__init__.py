@@ -3,11 +3,10 @@
 from discover.forward import DeclaredModel
 from discover.inference.engine.design import NextTest, NextTests
 from discover.inference.engine.free_functions import FreeForm
-from discover.loop.constants import StageParameter
 from discover.loop.loop import run_loop, run_loop_on_each
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import CandidateScore, ErrorPair, Stage
-from discover.loop.run_record import RunRecord
+from discover.loop.parts import CandidateScore, ErrorPair, Stage, StageParameter
+from discover.loop.runs import RunRecord
 
 __all__ = [
     "CandidateScore",

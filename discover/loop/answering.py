@@ -17,24 +17,15 @@ from discover.answer import (
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
-from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
-from discover.equations import Equation, law_parts
+from discover.equations import AugmentedLaw, Equation, law_parts
 from discover.equations.formats.rheotool import DENSITY
-from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.laws.registry import LAWS
-from discover.loop.by_quantity import (
-    errors_by_quantity,
-    normal_stress_settled,
-    of_fitted,
-    of_stress,
-    with_unseen,
-)
-from discover.loop.constants import ConstantByMode, StageParameter
+from discover.loop import by_quantity
 from discover.loop.fitted_range import range_of
-from discover.loop.parts import STRUCTURES, Stage
-from discover.loop.run_record import RunRecord
+from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
+from discover.loop.runs import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import (
     effect_title,
@@ -45,14 +36,10 @@ from discover.words import (
     significant,
 )
 
-_MOST_ADDED = 2
-"""Effects added to a law, up to which their sum is told as that law with these."""
-
-_SETTLED = 0.95
-"""Probability from which on nothing is said of other laws."""
-
+_MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
+_SETTLED = 0.95  # Probability from which on nothing is said of other laws
+# Misfit over the change from sample to sample up to which a simple material leaves only noise
 _TO_NOISE = 1.5
-"""Misfit over the change from sample to sample up to which a simple material leaves only noise."""
 
 LAW_OF_EFFECT = {
     "giesekus_mobility": "giesekus",
@@ -94,9 +81,9 @@ def loop_answer(result: Any) -> Answer:
         result.error_after.fit,
         result.noise_floor,
         result.verdict in EXPLAINED,
-        with_unseen(result),
+        by_quantity.with_unseen(result),
         range_of(result.records, equation),
-        errors_by_quantity(result),
+        by_quantity.errors_by_quantity(result),
         following,
         tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         failed=_failed(result),
@@ -162,7 +149,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
-    left = of_fitted(result.records, result.error_after.fit, result.noise_floor)
+    left = by_quantity.of_fitted(result.records, result.error_after.fit, result.noise_floor)
     answer = Answer(
         material.title,
         material.law,
@@ -172,7 +159,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
         fits_to_the_noise=to_noise,
         discrepancy=None if to_noise else left,
         range=found,
-        expected_error={"sigma12": of_stress(result)},
+        expected_error={"sigma12": by_quantity.of_stress(result)},
         next_test=following,
         failed=_failed(result),
         tolerance=result.tolerance,
@@ -208,19 +195,15 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
         return None
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
-    maximum = " (flow curve with a maximum)" if _has_maximum(near) else ""
+    name, least = _MAXIMUM.get(near.law, ("", 0.0))
+    has_maximum = name in near.constants and near.constants[name].value > least
+    maximum = " (flow curve with a maximum)" if has_maximum else ""
     return f"{', '.join(said)}{maximum}", near.size
 
 
+# Constant above which the flow curve of each mode has a maximum   [Giesekus 1982, J. Non-Newtonian
+# Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255].
 _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
-"""Constant above which the shear stress of a mode falls with the rate   [Giesekus 1982, J.
-Non-Newtonian Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255]."""
-
-
-def _has_maximum(near: Any) -> bool:
-    """Return whether the flow curve of each mode of a classical law has a maximum."""
-    name, least = _MAXIMUM.get(near.law, ("", 0.0))
-    return name in near.constants and near.constants[name].value > least
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -293,7 +276,7 @@ def shows_a_derivative(result: Any) -> bool:
     """
     seen = [(r.flow, r.quantity) for r in result.records if not r.held_out]
     other = any(flow != "shear" or quantity in ("N1", "N2") for flow, quantity in seen)
-    return other or normal_stress_settled(result)
+    return other or by_quantity.normal_stress_settled(result)
 
 
 def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[Constant]:
@@ -319,18 +302,12 @@ def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     if stage.kind != "constitutive" or stage.effect in (*LAW_OF_EFFECT, *STRUCTURES):
         return found
     first, *others = found
-    meaning = "; ".join(filter(None, [first.said, f"odds for it {_odds(stage.evidence)}"]))
-    return replace(first, meaning=meaning), *others
+    odds = float(np.exp(min(0.5 * stage.evidence, 10.0)))
+    told = f"odds for it {f'> {_SURE}' if odds > _SURE else significant(odds, 2)}:1"
+    return replace(first, meaning="; ".join(filter(None, [first.said, told]))), *others
 
 
-def _odds(evidence: float) -> str:
-    """Return odds for an effect that was added, of twice their logarithm."""
-    odds = float(np.exp(min(0.5 * evidence, 10.0)))
-    return f"> {_SURE}:1" if odds > _SURE else f"{significant(odds, 2)}:1"
-
-
-_SURE = 1000
-"""Odds from which on more say no more."""
+_SURE = 1000  # Odds from which on more say no more
 
 
 def _constants(
@@ -341,43 +318,27 @@ def _constants(
 ) -> tuple[Constant, ...]:
     known = parameters_of(effect) if effect else {}
     spelled = letters or {name: one.symbol for name, one in known.items()}
-    return tuple(
-        Constant(
-            name,
-            one.value,
-            one.ci95,
-            one.unit or "1",
-            name not in left_open and not (isinstance(one, StageParameter) and one.is_open),
-            _of_mode(one, name, spelled.get(name, "")),
-            meaning=_of_mean_mode(one, _meaning(effect, known[name]) if name in known else ""),
-            end=one.at_end if isinstance(one, StageParameter) else "",
-            over_modes=one.span if isinstance(one, ConstantByMode) and _differs(one) else None,
-        )
-        for name, one in parameters.items()
-    )
-
-
-def _of_mode(one: Any, name: str, letter: str) -> str:
-    """Return the letter of a constant, with the index of the mode where it differs."""
-    return f"{letter or readable(name)}_k" if _differs(one) else letter
-
-
-def _differs(one: Any) -> bool:
-    """Return whether a constant differs from mode to mode."""
-    return isinstance(one, ConstantByMode) and bool(one.degree)
-
-
-def _of_mean_mode(one: Any, meaning: str) -> str:
-    """Return what a constant is; of one that differs from mode to mode, where its values stand."""
-    place = "each under “Constants by mode”" if _differs(one) else ""
-    return "; ".join(filter(None, [meaning, place]))
-
-
-def _meaning(effect: str, parameter: EffectParameter) -> str:
-    """Return what a parameter is, in a few words; a letter stands for its effect."""
-    words = parameter.name.replace("_", " ")
-    is_letter = len(words) < 3 or readable(words) != words
-    return parameter.meaning or (effect_title(effect) if is_letter else words)
+    found = []
+    for name, one in parameters.items():
+        by_mode = one if isinstance(one, ConstantByMode) and one.degree else None
+        fitted = one if isinstance(one, StageParameter) else None
+        letter, meaning = spelled.get(name, ""), ""
+        if name in known:  # what it is, in a few words; a letter stands for its effect
+            words = name.replace("_", " ")
+            is_letter = len(words) < 3 or readable(words) != words
+            meaning = known[name].meaning or (effect_title(effect) if is_letter else words)
+        if by_mode is not None:
+            letter = f"{letter or readable(name)}_k"
+            meaning = "; ".join(filter(None, [meaning, "each under “Constants by mode”"]))
+        found.append(
+            Constant(
+                name, one.value, one.ci95, one.unit or "1",
+                name not in left_open and not (fitted is not None and fitted.is_open),
+                letter, meaning, "" if fitted is None else fitted.at_end,
+                None if by_mode is None else by_mode.span,
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def _renamed(

@@ -11,18 +11,16 @@ from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
 from discover.answer.sentences import MEASURED_AT, MUCH
 from discover.loop.fitted_range import by_temperature
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.words import listed, percent_of
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
 
-_APART = 0.2
-"""Relative difference between laws from which on a quantity is not determined."""
-
+_APART = 0.2  # Relative difference between laws from which on a quantity is not determined
+# Relative difference between laws that is told of a quantity that nothing tested
 _WORTH_SAYING = 0.05
-"""Relative difference between laws that is told of a quantity that nothing tested."""
 
 FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
@@ -88,7 +86,10 @@ def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
         }
     else:
         found = dict(result.left_out)
-        found |= {record.name: _missed(record, result) for record in _held_inside(result)}
+        found |= {
+            record.name: beyond_noise(float(record.errors[-1]), result.noise_floor)
+            for record in _held_inside(result)
+        }
     own = {record.name for record in result.records if not kind or _is(record, kind)}
     return {name: error for name, error in found.items() if name in own}
 
@@ -108,10 +109,6 @@ def _held_inside(result: Any) -> list[RunRecord]:
     ]
 
 
-def _missed(record: RunRecord, result: Any) -> float:
-    return beyond_noise(float(record.errors[-1]), result.noise_floor)
-
-
 def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": of_stress(result)}
@@ -125,7 +122,9 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
             found[kind] = own
             continue
         apart = differing(result, kind)
-        differ = "" if apart is None else f"laws that fit as well differ by {_at_most(apart)}"
+        much = apart is not None and apart > MUCH  # of laws that diverge only that it is much
+        by = f"more than {percent_of(MUCH)}" if much else percent_of(apart or 0.0)
+        differ = "" if apart is None else f"laws that fit as well differ by {by}"
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
@@ -154,14 +153,14 @@ def _second_difference(result: Any, differ: str) -> ExpectedError:
     return ExpectedError(note=f"{share} by this law")
 
 
-_NOTHING = 1e-3
-"""N2 over N1 that rounding of the integration leaves."""
+_NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
 
 
 def normal_stress_settled(result: Any) -> bool:
     """Return whether laws that describe the runs as well have one N1: more than linear response."""
     apart = differing(result, "N1")
-    return apart is not None and apart < _APART and not _only_linear(result)
+    only_linear = all(record.control == "oscillation" for record in result.records)
+    return apart is not None and apart < _APART and not only_linear
 
 
 def differing(result: Any, kind: str) -> float | None:
@@ -170,24 +169,12 @@ def differing(result: Any, kind: str) -> float | None:
     return None if spread is None else spread.inside
 
 
-def _at_most(apart: float) -> str:
-    """Return by how much laws differ; of laws that diverge only that it is much."""
-    return percent_of(apart) if apart <= MUCH else f"more than {percent_of(MUCH)}"
-
-
-def _only_linear(result: Any) -> bool:
-    """Return whether nothing but linear response was measured."""
-    return all(record.control == "oscillation" for record in result.records)
-
-
 def of_stress(result: Any) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
-    fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
-    held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
-    fast = [r for r in held if r.fastest > FASTER * fastest]
     errors = unseen_errors(result, "sigma12")
-    inside, at = _mean([*errors.values()]), _measured_at(fast)
-    beyond = _mean([_missed(r, result) for r in fast])
+    inside = _mean([*errors.values()])
+    own = measured(result.records, "sigma12", result.noise_floor) or ExpectedError()
+    beyond, at = own.beyond, own.beyond_at
     spread = result.spread_of_laws.get("sigma12")
     if beyond is None and spread is not None and spread.beyond is not None:
         beyond, at = max(spread.beyond, inside or 0.0), _TWICE

@@ -12,21 +12,17 @@ from discover.inference.engine import Posterior
 from discover.inference.engine.fit import Fit
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
-from discover.protocols import FlowProtocol, in_flow, start_up
+from discover.protocols import FlowProtocol, in_flow, shear_rates, start_up
 from discover.protocols.kinematics import RecordedQuantity
-from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms
 
 _LAWS, _DRAWS = 20, 4
+# Of the runs, as which they count where laws are weighed that were fitted to them and are all
+# wrong: on development seeds with one and less, bands of N1 hold 92 and 98 % of the samples
 _TEMPERED = 0.5
-"""Of the runs, as which they count where laws are weighed that were fitted to them and are all
-wrong: on development seeds with one and less, bands of N1 hold 92 and 98 % of the samples."""
-
 _SAMPLES = 81
 _STRAIN, _HENCKY = 20.0, 3.0
-_LEAST_LIKELY = 0.01
-"""Of the likeliest law, below which one changes nothing."""
-
+_LEAST_LIKELY = 0.01  # Of the likeliest law, below which one changes nothing
 _SEED = 20261128
 
 _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
@@ -52,10 +48,7 @@ class Spread:
 def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     """Return by how much σ12, N1, N2 and uniaxial stress differ between equally good laws.
 
-    See `weighed_laws`.
-
-    `posterior`: what the runs say. `best`: the law that is reported, from which differences are
-    counted.
+    These are `weighed_laws`. `best`: the law that is reported, from which differences are counted.
     """
     runs = posterior.problem.fitted.runs
     weighed = weighed_laws(posterior)

@@ -11,8 +11,13 @@ from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
 from discover.laws import Fluid
 from discover.laws.each_mode import with_modes
-from discover.loop.constants import ConstantByMode, StageParameter, end_of_range
-from discover.loop.parts import DeclaredEffect, KnownParameter
+from discover.loop.parts import (
+    ConstantByMode,
+    DeclaredEffect,
+    KnownParameter,
+    StageParameter,
+    end_of_range,
+)
 from discover.programs import on_device
 
 Bounds = Mapping[int, tuple[float, float]]
@@ -68,11 +73,7 @@ def declared_effects(
 def declared_law(
     declared: DeclaredModel, theta: Theta, by_mode: Mapping[str, ConstantByMode]
 ) -> Equation | None:
-    """Return the declared law with its modes as fitted; None where it cannot be written out.
-
-    `declared`: the declared model. `theta`: its constants. `by_mode`: constants of the law that
-    differ from mode to mode.
-    """
+    """Return the declared law with its modes as fitted; None where it cannot be written out."""
     law = declared.law_with(theta[2 : 2 + len(declared.free_parameters)])
     differing = {name: one.values for name, one in by_mode.items()}
     try:

@@ -8,16 +8,14 @@ import numpy as np
 from discover.answer import Range
 from discover.equations import Equation
 from discover.equations.equation import flow_numbers
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 
+# Share of the largest rate that a flow reaches in the other direction, if it oscillates
 _TURNS = 0.5
-"""Share of the largest rate that a flow reaches in the other direction, if it oscillates."""
-
+# Share of the time of a run for which it is at most as slow as the slowest rate of its range
 _STAYS = 0.05
-"""Share of the time of a run for which it is at most as slow as the slowest rate of its range."""
-
+# Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop
 _AT_REST = 1e-3
-"""Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop."""
 
 
 def by_temperature(records: Sequence[RunRecord]) -> dict[float, list[RunRecord]]:

@@ -17,38 +17,30 @@ from discover.forward.declared import DEGREE, constants_of_modes
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import TORQUE, Rows
-from discover.loop.constants import (
+from discover.inference.engine.rows import TORQUE
+from discover.loop import final_model
+from discover.loop.expected_errors import spread_of_laws
+from discover.loop.loop_result import LoopResult
+from discover.loop.measured_rates import instants_found
+from discover.loop.parts import (
+    CandidateScore,
     ConstantByMode,
+    LawFit,
     ModeConstant,
+    Stage,
     StageParameter,
     end_of_range,
 )
-from discover.loop.expected_errors import spread_of_laws
-from discover.loop.final_model import (
-    Bounds,
-    augmented_fluid,
-    declared_effects,
-    declared_law,
-    declared_parameters,
-    states_of,
-)
-from discover.loop.loop_result import LoopResult
-from discover.loop.measured_rates import instants_found
-from discover.loop.parts import CandidateScore, LawFit, Stage
 from discover.loop.path import Path
-from discover.loop.run_record import errors_of
-from discover.loop.runs import why_untested
+from discover.loop.runs import errors_of, why_untested
 from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
 from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of
 
 _DRAWS = 2000
-_FREE = 3
-"""Degree of constants that are free in each mode."""
-
+_FREE = 3  # Degree of constants that are free in each mode
+# Half width of an interval over the prior's, from which on the runs tell nothing of a mode
 _FEWEST_TOLD = 0.5
-"""Half width of an interval over the prior's, from which on the runs tell nothing of a mode."""
 
 
 def _at_ends(
@@ -69,7 +61,7 @@ class Ended(Path):
     """What is reported of a posterior: constants, stages, rankings, what is left."""
 
     @cached_property
-    def bounds(self) -> Bounds:
+    def bounds(self) -> final_model.Bounds:
         """95 % intervals of all that is free in the likeliest hypothesis, by position."""
         found = {}
         for at in self.fit.free:
@@ -176,24 +168,14 @@ class Ended(Path):
             (name,) = set(after.names) - set(before.names)
             effect, model = self.posterior.problem.effects[name], self.posterior.problem.model
             at = dict(zip((p.name for p in effect.parameters), model.positions(name), strict=True))
-            parameters = {
-                p.name: StageParameter(
-                    float(self.fit.theta[at[p.name]]),
-                    self.bounds[at[p.name]],
-                    p.unit,
-                    at_end=end_of_range(
-                        float(self.fit.theta[at[p.name]]),
-                        float(model.low[at[p.name]]),
-                        float(model.high[at[p.name]]),
-                    ),
-                )
-                for p in effect.parameters
-            }
-            left_open = tuple(
-                key
-                for key, one in parameters.items()
-                if one.is_open_up_to(float(model.high[at[key]]))
-            )
+            parameters, left_open = {}, []
+            for p in effect.parameters:
+                place = at[p.name]
+                value = float(self.fit.theta[place])
+                end = end_of_range(value, float(model.low[place]), float(model.high[place]))
+                parameters[p.name] = StageParameter(value, self.bounds[place], p.unit, at_end=end)
+                if parameters[p.name].is_open_up_to(float(model.high[place])):
+                    left_open.append(p.name)
             if name in self.by_mode:
                 parameters[effect.parameters[0].name] = self.by_mode[name]
             gained = 2.0 * (search.rank(after) - search.rank(before))
@@ -202,7 +184,7 @@ class Ended(Path):
                 Stage(
                     name, effect.kind, parameters, aliases, errors_of(self.records, i),
                     float(gained), spelled[name].equation, effect.source, effect.check,
-                    left_open=left_open,
+                    left_open=tuple(left_open),
                 )
             )  # fmt: skip
         return tuple(found)
@@ -241,9 +223,9 @@ class Ended(Path):
         problem, fit = self.posterior.problem, self.fit
         rows = problem.fitted
         fitter = self.posterior.search.fitter
-        left = np.zeros(rows.batch.recorded.shape)
-        left[rows.seen] = (fitter.record(fit) - rows.recorded) / rows.size
-        probability = noise_probability(left, rows.seen.astype(float), _padded(rows))
+        padded = np.zeros((2, *rows.batch.recorded.shape))
+        padded[:, rows.seen] = (fitter.record(fit) - rows.recorded) / rows.size, rows.recorded
+        probability = noise_probability(padded[0], rows.seen.astype(float), padded[1])
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs
@@ -344,19 +326,17 @@ def result_of(
     spikes: Mapping[str, Sequence[float]],
     of_rates: str,
 ) -> LoopResult:
-    """Return the result of a loop.
+    """Return the result of a loop; `spikes`, `of_rates` as `Task` has them.
 
-    `ended`: the posterior that it ended with. `laws`: those that the declared one was chosen from.
-    `spikes`: times of samples set aside as outliers, by run. `of_rates`: that rates were read with
-    noise which the fluid did not feel, in words; empty where not.
+    `laws`: those that the declared one was chosen from.
     """
     problem, theta = ended.posterior.problem, ended.theta
     declared, model, by_mode = problem.declared, problem.model, ended.by_mode
     present = [*ended.fit.names, *(known.name for known in declared.effects)]
-    fluid = augmented_fluid(model, theta, present)
-    states = states_of(model, theta, present)
+    fluid = final_model.augmented_fluid(model, theta, present)
+    states = final_model.states_of(model, theta, present)
     whole = bool(by_mode) or states != ()
-    own = declared_parameters(declared, theta, ended.bounds)
+    own = final_model.declared_parameters(declared, theta, ended.bounds)
     of_law = {name: one for name, one in by_mode.items() if name in own}
     # only what is fitted of a known effect has an interval
     free = {at: ends for at, ends in ended.bounds.items() if at in model.free_positions}
@@ -375,8 +355,8 @@ def result_of(
         rankings=ended.rankings(),
         records=tuple(ended.records),
         declared_parameters=own | of_law,
-        declared_effects=declared_effects(model, theta, free, by_mode),
-        declared_law=declared_law(declared, theta, of_law),
+        declared_effects=final_model.declared_effects(model, theta, free, by_mode),
+        declared_law=final_model.declared_law(declared, theta, of_law),
         explanations=ended.explanations,
         next_tests=tests,
         laws=laws,
@@ -389,9 +369,3 @@ def result_of(
         fluid_at_mean=fluid if whole else None,
         states=states or (),
     )
-
-
-def _padded(rows: Rows) -> Float[np.ndarray, "runs n"]:
-    out = np.zeros(rows.batch.recorded.shape)
-    out[rows.seen] = rows.recorded
-    return out

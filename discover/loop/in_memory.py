@@ -13,13 +13,7 @@ from discover.laws.multimode import Fluid
 from discover.loop.loop import run_study
 from discover.loop.loop_result import LoopResult
 from discover.progress import Progress, checked
-from discover.study.in_memory import (
-    HeldOut,
-    data_in_memory,
-    declared_fluid,
-    study_in_memory,
-    with_known,
-)
+from discover.study import in_memory
 from discover.words import unknown_name
 
 _OPTIONS = {
@@ -31,7 +25,7 @@ def close_loop(
     data: Dataset,
     base: Fluid | None = None,
     *,
-    held_out: HeldOut = (),
+    held_out: in_memory.HeldOut = (),
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
     known_effects: Mapping[str, Any] | None = None,
@@ -99,9 +93,11 @@ def close_loop(
         named = isinstance(effects, str)
         effects = effects if named else list(effects)
         options["effects"] = effects if named else [getattr(e, "name", e) for e in effects]
-    divided = data_in_memory(data, held_out)
-    declared = with_known(declared_fluid(base, data), known_effects, free, by_mode)
+    divided = in_memory.data_in_memory(data, held_out)
+    declared = in_memory.with_known(
+        in_memory.declared_fluid(base, data), known_effects, free, by_mode
+    )
     asked = {"loop": options, "verdict": {"tolerance": tolerance}}
-    study = study_in_memory(data, asked, "close_loop()")
+    study = in_memory.study_in_memory(data, asked, "close_loop()")
     declared = replace(declared, choice=tuple(laws or ()))
     return run_study(study, divided, declared, checked(progress), effects)

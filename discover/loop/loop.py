@@ -37,8 +37,7 @@ from discover.words import counted
 MOST_LISTED = 8
 """Explanations that are listed by default."""
 
-_OFF = 1e-30
-"""Factor on the moduli of a fluid that is switched off."""
+_OFF = 1e-30  # Factor on the moduli of a fluid that is switched off
 
 
 @in_one_thread
@@ -63,20 +62,12 @@ def run_loop(
     instrument errors are fitted jointly. All are weighed by evidence and prior, unknown effects
     among them; see `discover.inference.engine`. Nothing is random.
 
-    `declared`: the model to start from. `fit`: names of the runs to fit; by default all that are
-    not held out. `held_out`: names of the held-out runs, which only test. `effects`: candidates, by
-    name, by spelling of a library term, or as objects; ``"named"`` for every effect with a name
-    that is no candidate on request alone; by default these and every library term up to one
-    invariant. `max_effects`: largest number of effects added. `strain`: smallest and largest strain
-    of the samples fitted and tested. `noise`: relative noise, where it is known; estimated along
-    otherwise. `most_samples`: of a run with more samples at most so many are used, evenly chosen;
-    of one with little noise fewer, but no fewer than 150. `explanations`: how many sets of effects
-    are listed, at most. `laws`: named laws to choose the declared one from, by the fitted runs
-    alone, each with its likeliest further effects. By default it is as it was declared.
-    `progress`: called with a line of text now and then. `loading`: relative standard deviation by
-    which loadings of the sample differ, where each run is one of its own: its record is then a
-    factor of its own times what the model predicts, with that deviation from one. By default there
-    is no such factor.
+    `max_effects`, `strain`, `noise`, `most_samples`, `explanations` and `loading` are those of
+    `discover.study.schema.Loop`. `fit`, `held_out`: names of runs; by default all are fitted that
+    are not held out. `effects`: as in `candidates_of`. `most_samples`: evenly chosen; of a run with
+    little noise fewer, but no fewer than 150. `laws`: named laws to choose the declared one from,
+    by the fitted runs alone, each with its likeliest further effects. `loading`: the record of a
+    run is then a factor of its own times what the model predicts, with that deviation from one.
 
     Raises InputError if runs, window or effects are not as they should be, or the model diverges in
     the fitted runs.
@@ -110,8 +101,8 @@ def run_study(
 ) -> LoopResult:
     """Close the loop as a study asks, and judge it by the runs held out: some, or each in turn.
 
-    `data`, `declared`: of the study. `progress`: called with a line of text now and then, and about
-    what fraction is done. `effects`: candidates in place of the study's.
+    `progress`: called with a line of text now and then, and about what fraction is done. `effects`:
+    candidates in place of the study's.
     """
     options: dict[str, Any] = dict(study.loop) | {"laws": declared.choice, "fit": data.fit.names}
     options |= {} if effects is None else {"effects": effects}
@@ -172,10 +163,8 @@ def run_loop_on_each(
     without one run, so that neither its stress nor the choice of effects has seen it   [Stone 1974,
     J. R. Stat. Soc. B 36, 111]. They judge the way of finding a law rather than the one law found.
 
-    `dataset`, `declared`, `progress`, `**options`: as in `run_loop`. `fit`: names of the runs; by
-    default all.
-
-    Raises InputError as in `run_loop`, or if there are fewer than two runs.
+    `fit`: names of the runs; by default all. Raises InputError as `run_loop`, or if there are fewer
+    than two runs.
     """
     names = list(dataset.names if fit is None else fit)
     if len(names) < 2:

@@ -26,22 +26,11 @@ from discover.errors import InputError
 from discover.inference.engine.design import NextTests
 from discover.inference.engine.free_functions import FreeForm
 from discover.laws import Fluid
+from discover.loop import parts
 from discover.loop.answering import loop_answer
-from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.expected_errors import Spread
-from discover.loop.parts import (
-    CandidateScore,
-    DeclaredEffect,
-    ErrorPair,
-    Explanations,
-    Fold,
-    LawFit,
-    NearestLaw,
-    Stage,
-    Verdict,
-)
 from discover.loop.reading import Reading, read_residual
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.plain_numbers import json_text, plain
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
@@ -81,32 +70,32 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     page.
     """
 
-    verdict: Verdict
-    error_before: ErrorPair
-    error_after: ErrorPair
+    verdict: parts.Verdict
+    error_before: parts.ErrorPair
+    error_after: parts.ErrorPair
     noise_floor: float
-    stages: tuple[Stage, ...]
+    stages: tuple[parts.Stage, ...]
     remaining: dict[str, Any]
-    rankings: tuple[tuple[CandidateScore, ...], ...] = field(repr=False, default=())
+    rankings: tuple[tuple[parts.CandidateScore, ...], ...] = field(repr=False, default=())
     records: tuple[RunRecord, ...] = field(repr=False, default=())
-    declared_parameters: dict[str, StageParameter] = field(default_factory=dict)
-    declared_effects: tuple[DeclaredEffect, ...] = ()
+    declared_parameters: dict[str, parts.StageParameter] = field(default_factory=dict)
+    declared_effects: tuple[parts.DeclaredEffect, ...] = ()
     declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
     fluid_at_mean: Fluid | None = field(repr=False, default=None)
     states: tuple[StatePart, ...] = field(repr=False, default=())
-    explanations: Explanations = field(default_factory=Explanations)
+    explanations: parts.Explanations = field(default_factory=parts.Explanations)
     next_tests: NextTests = field(repr=False, default_factory=NextTests)
-    laws: tuple[LawFit, ...] = ()
+    laws: tuple[parts.LawFit, ...] = ()
     free_form: tuple[FreeForm, ...] = ()
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out: Mapping[str, float] = field(default_factory=dict)
-    nearest_law: NearestLaw | None = None
+    nearest_law: parts.NearestLaw | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE
     temperature_C: float | None = None
-    folds: tuple[Fold, ...] = ()
+    folds: tuple[parts.Fold, ...] = ()
     seconds: float = 0.0
     title: str = field(repr=False, default="")
     described: str = field(repr=False, default="")
@@ -120,13 +109,13 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
         return f"<LoopResult: {self.verdict}; {added}; error {percent_of(fit)}{judged}>"
 
     @property
-    def by_mode(self) -> dict[str, ConstantByMode]:
+    def by_mode(self) -> dict[str, parts.ConstantByMode]:
         """Constants that might differ from mode to mode: by their name, or by their effect's."""
         of_law = self.declared_parameters.items()
-        found = {name: one for name, one in of_law if isinstance(one, ConstantByMode)}
+        found = {name: one for name, one in of_law if isinstance(one, parts.ConstantByMode)}
         for effect in (*self.declared_effects, *self.stages):
             for one in effect.parameters.values():
-                if isinstance(one, ConstantByMode):
+                if isinstance(one, parts.ConstantByMode):
                     found[effect.effect] = one
         return found
 
@@ -157,8 +146,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     def without_answer(self) -> Equation:
         """Return the augmented fluid as an equation, with the box in which it was tested.
 
-        Raises InputError if an effect gives the fluid a state that nobody wrote out, or adds what
-        is no sum of library terms, or if what it adds differs from mode to mode.
+        Raises InputError as `equation`.
         """
         fluid = self.fluid_at_mean if self.fluid is None else self.fluid
         if self.material is not None:

@@ -15,8 +15,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.dataset.run_table import wave_of
 from discover.effects import simplest_terms
-from discover.forward.augmented_model import AugmentedModel
-from discover.forward.declared import DeclaredModel
+from discover.forward import AugmentedModel, DeclaredModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.problem import Problem
 from discover.protocols import another_between_samples, sampled_rate
@@ -25,13 +24,11 @@ from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.whiteness import separate_probability
 from discover.words import percent_of
 
-_LEAST = 5e-3
-"""Scatter over the size of the rate, below which the stress hardly tells it from none."""
-
+_LEAST = 5e-3  # Scatter over the size of the rate, below which the stress hardly tells it from none
 _FEWEST = 24
 _SEEMS_NOISE = 0.01
+# Of log likelihood, from which on smooth rates are believed: twenty times as likely
 _LIKELIER = 3.0
-"""Of log likelihood, from which on smooth rates are believed: twenty times as likely."""
 
 
 def smoothed(run: Run) -> Run:
@@ -65,8 +62,6 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
 
     Every simple term of the library is fitted at either rate: a law too flexible to be believed
     tells which of them the fluid felt.
-
-    `declared`: the model to start from. `runs`: that are fitted.
     """
     smooth = [smoothed(run) for run in runs]
     scatter = [
@@ -91,8 +86,7 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
     )
 
 
-_MOST = 40
-"""Steps whose instants are fitted, at most: each costs a constant."""
+_MOST = 40  # Steps whose instants are fitted, at most: each costs a constant
 
 
 def with_rate_steps(run: Run) -> Run:

@@ -1,4 +1,4 @@
-"""Parts of the result of a closed loop: errors, effects that were added, explanations, laws."""
+"""Parts of the result of a closed loop: errors, constants, effects, explanations, laws."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 from discover.equations import Equation, equation_to_json
 from discover.laws import LAWS
-from discover.loop.constants import ConstantByMode, StageParameter
 
 STRUCTURES = (
     "thixotropy",
@@ -27,6 +26,82 @@ class ErrorPair:
 
     fit: float
     held_out: float | None
+
+
+# Factor above the value from which on an interval tells nothing: two decades, beyond which records
+# tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163].
+_OPEN = 100.0
+_DECADE = 10.0  # The same on both sides
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class StageParameter:
+    """A parameter of an effect as finally fitted."""
+
+    value: float  # that of the effects that were found
+    ci95: tuple[float, float]  # 95 % interval over all explanations that have the parameter
+    unit: str
+    at_end: Literal["", "low", "high"] = field(default="", kw_only=True)  # of its physical range
+
+    @property
+    def is_open(self) -> bool:
+        """Whether these data leave it open: two decades above it, or a decade on both sides."""
+        low, high = self.ci95
+        both = 0.0 < low < abs(self.value) / _DECADE and high > _DECADE * abs(self.value)
+        return both or high > _OPEN * abs(self.value)
+
+    def is_open_up_to(self, end: float) -> bool:
+        """Whether it is open in a range: from two decades below its upper end, to that end."""
+        low, high = self.ci95
+        # a logarithm there and back errs by a rounding
+        at_the_end = high >= (1.0 - _ROUNDING) * end
+        return self.is_open or (at_the_end and end > _OPEN * max(low, 0.0))
+
+
+def end_of_range(value: float, low: float, high: float) -> Literal["", "low", "high"]:
+    """Return at which end of a range a value is, but for a rounding; empty inside it."""
+    off = _ROUNDING * abs(value)
+    return "low" if value <= low + off else "high" if value >= high - off else ""
+
+
+@dataclass(frozen=True)
+class ModeConstant:
+    """The constant of one mode.
+
+    `left_open`: whether the interval leaves hardly a value out, so that what stands here comes from
+    the other modes and the smooth function alone.
+    """
+
+    relaxation_time_s: float
+    value: float
+    ci95: tuple[float, float] | None  # given that it is a smooth function of the time
+    left_open: bool
+
+
+@dataclass(frozen=True)
+class ConstantByMode(StageParameter):
+    """A constant by mode; `value` and `ci95` are those at the mean time.
+
+    `degree`: 3 is free in each mode that the runs tell; of earlier results that of a polynomial in
+    log λ.
+    """
+
+    mean_time_s: float  # mean relaxation time by viscosity
+    degree: int
+    evidence: tuple[float, ...]  # the last is that over one constant
+    modes: tuple[ModeConstant, ...]  # in the order of the declared modes
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Value of each mode."""
+        return tuple(mode.value for mode in self.modes)
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """Least and largest value of the modes that the runs determine; None where none is."""
+        told = [mode.value for mode in self.modes if not mode.left_open]
+        return (min(told), max(told)) if told else None
 
 
 @dataclass(frozen=True)

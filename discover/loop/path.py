@@ -16,10 +16,9 @@ from discover.inference.engine.free_functions import FreeForm
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search
 from discover.loop.parts import ErrorPair, Explanation, Explanations, Verdict
-from discover.loop.run_record import RunRecord, record_runs
+from discover.loop.runs import RunRecord, record_runs
 
-_NEGLIGIBLE = 1e-4
-"""Probability below which an explanation is not listed."""
+_NEGLIGIBLE = 1e-4  # Probability below which an explanation is not listed
 
 
 def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:

@@ -14,8 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.answer.naming import named_law
-from discover.equations import Equation
-from discover.equations.parts import StatePart
+from discover.equations import Equation, StatePart
 from discover.errors import InputError
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
@@ -24,17 +23,14 @@ from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.laws import Fluid
 from discover.linear_algebra_threads import in_one_thread
-from discover.loop.constants import StageParameter
 from discover.loop.final_model import augmented_fluid, states_of
-from discover.loop.parts import STRUCTURES, NearestLaw
+from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 
-_MOST = 8
-"""Laws of each kind with a name, the likeliest, that are fitted without each run."""
-
+_MOST = 8  # Laws of each kind with a name, the likeliest, that are fitted without each run
+# Log of odds against the best down to which runs left out do not exclude a law
 _AS_WELL = float(np.log(0.05))
-"""Log of odds against the best down to which runs left out do not exclude a law."""
 
 
 @in_one_thread
@@ -53,7 +49,12 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if any(has_name(posterior, known[0][0]) for has_name in of_the_field):
         return posterior
     leading = [fit for fit, _ in known]
-    _finish_laws(posterior)
+    # the likeliest laws with a name are fitted to the end that the search gave up, as far behind
+    search = posterior.search
+    given_up = (f for f in search.found.values() if f.root is None and np.isfinite(f.log_posterior))
+    some = sorted(given_up, key=lambda fit: -fit.log_posterior)
+    laws = islice((fit for fit in some if law_of(posterior, fit)), _MOST)
+    search.add([search.fitter.start(fit.names, fit.theta, fit.linear) for fit in laws])
     alive = posterior.search.alive()
     classical, thixotropic = (
         list(islice((fit for fit in alive if has_name(posterior, fit)), _MOST))
@@ -78,15 +79,6 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
         left=Discrepancy(fitter, chosen, smallest(posterior.search, chosen)),
         by_left_out=tuple((some[i], float(weights[i])) for i in order),
     )
-
-
-def _finish_laws(posterior: Posterior) -> None:
-    """Fit the likeliest laws with a name to the end that the search gave up, as far behind."""
-    search = posterior.search
-    given_up = (f for f in search.found.values() if f.root is None and np.isfinite(f.log_posterior))
-    some = sorted(given_up, key=lambda fit: -fit.log_posterior)
-    laws = islice((fit for fit in some if law_of(posterior, fit)), _MOST)
-    search.add([search.fitter.start(fit.names, fit.theta, fit.linear) for fit in laws])
 
 
 def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:

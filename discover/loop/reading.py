@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 from scipy.stats import permutation_test, rankdata
 
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.words import p_value, percent_of
 
 HARMONICS = 5
@@ -208,8 +208,7 @@ def _plain(name: str) -> str:
 def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
     """Return how the residuals of some runs change from run to run, and their waves.
 
-    `records`: runs with their predictions. `model`: which prediction: 0 for the declared model, −1
-    for the augmented one.
+    `model`: which prediction: 0 is that of the declared model, −1 of the augmented one.
     """
     # strains, rates and stresses of a shear and of an extension have no scale in common, so records
     # of one kind are read together; a steady state knows neither time nor strain

@@ -1,6 +1,7 @@
-"""Runs that a closed loop fits, and those that judge it: each value once, cut and thinned."""
+"""Runs of a closed loop: as it fits and judges by them, cut and thinned, and as it leaves them."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -9,11 +10,14 @@ from jaxtyping import Float
 from discover.dataset import Dataset, Run
 from discover.dataset.records.repeats import count_flows, require_no_copies
 from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
+from discover.dataset.run import TEMPERATURE
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.loop.measured_rates import with_rate_steps
+from discover.loop.parts import ErrorPair
 from discover.protocols import strains
-from discover.protocols.kinematics import STATES
+from discover.protocols.control import drawn_against
+from discover.protocols.kinematics import STATES, Control, FlowKind
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
 
@@ -25,8 +29,7 @@ MOST_SAMPLES = 400
 
 _FEWEST_ASKED = 10
 _FEWEST_KEPT = 150
-_RESOLVED = 1e-3
-"""Relative error that the noise of as many samples as are used may leave."""
+_RESOLVED = 1e-3  # Relative error that the noise of as many samples as are used may leave
 
 
 def split_runs(
@@ -60,19 +63,16 @@ def split_runs(
             "fewer samples."
         )
     spikes: dict[str, list[float]] = {}
-    fitted_runs, held_runs = (
-        [
-            thin_run(run, _needed(run, most))
-            for run in _without_spikes(
-                cut_to_strain(
-                    [without_held_values(with_rate_steps(run)) for run in part.runs], strain
-                ),
-                spikes,
-            )
-        ]
-        for part in (fitted, held)
-    )
-    return fitted_runs, held_runs, spikes
+
+    def prepared(runs: Sequence[Run]) -> Iterator[Run]:
+        stepped = [without_held_values(with_rate_steps(run)) for run in runs]
+        for run in cut_to_strain(stepped, strain):
+            left, times = without_spikes(run)
+            if times:
+                spikes[run.name] = times
+            yield thin_run(left, _needed(left, most))
+
+    return list(prepared(fitted.runs)), list(prepared(held.runs)), spikes
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
@@ -116,15 +116,6 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
     return cut
 
 
-def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:
-    """Give the runs without the samples that stand alone in them, whose times are noted."""
-    for run in runs:
-        left, times = without_spikes(run)
-        if times:
-            spikes[run.name] = times
-        yield left
-
-
 def _needed(run: Run, most: int) -> int:
     """Return how many samples of a run resolve its stress to `_RESOLVED`."""
     size = rms(run.recorded)
@@ -160,3 +151,128 @@ def why_untested(
     if all(run.protocol.control in STATES for run in (*fitted, *held_out)):
         return "states"
     return "flows" if not held_out and count_flows(fitted) <= constants else None
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """One run in the window of the loop, measured and predicted.
+
+    `name`, `held_out`: the run, and whether it was held out. `time`, `strain`, `instrument_time`:
+    in s, dimensionless, and in s on the instrument's clock, shape (n,). `rate`: commanded, in 1/s,
+    shape (n,); in extension the Hencky rate. `measured`: the quantity recorded, shape (n,): σ12 in
+    shear, σ11 − σ22 in extension. `predicted`: recorded stress in Pa by the declared model and
+    after each stage, shape (stages + 1, n). `errors`: relative error of each of these, shape
+    (stages + 1,). `conditions`: numbers that the source gives of the run, such as its temperature,
+    and its place in the order of the runs. `flow`: which flow it is. `quantity`: what is recorded:
+    ``sigma12``, ``tensile_stress``, ``N1``, ``N2``, ``storage_modulus`` or ``loss_modulus`` in Pa,
+    or ``strain``. `band`: where 95 % of the measurements should lie by all explanations together,
+    shape (2, n). `by_explanation`: what each explanation predicts, in the order of their
+    probability, shape (explanations, n). `control`: what was imposed. Where it is ``steady`` or
+    ``oscillation``, time only counts the samples; strain and rate of an oscillation are amplitudes.
+    """
+
+    name: str
+    held_out: bool
+    time: Float[np.ndarray, " n"]
+    strain: Float[np.ndarray, " n"]
+    instrument_time: Float[np.ndarray, " n"]
+    rate: Float[np.ndarray, " n"]
+    measured: Float[np.ndarray, " n"]
+    predicted: Float[np.ndarray, "stages n"]
+    errors: Float[np.ndarray, " stages"]
+    conditions: dict[str, float] = field(default_factory=dict)
+    flow: FlowKind = "shear"
+    quantity: str = "sigma12"
+    band: Float[np.ndarray, "2 n"] | None = None
+    control: Control = "rate"
+    by_explanation: Float[np.ndarray, "explanations n"] | None = None
+
+    @property
+    def fastest(self) -> float:
+        """Largest rate, in 1/s."""
+        return float(np.max(np.abs(self.rate)))
+
+    @property
+    def temperature_C(self) -> float | None:
+        """Temperature of the measurement, in whole °C; None where unknown."""
+        told = (self.conditions.get(key) for key in TEMPERATURE)
+        at = next((one for one in told if one is not None), None)
+        return None if at is None else float(round(at))
+
+    @property
+    def shift(self) -> float:
+        """Time on the instrument's clock over `time`: a_T of a run that was shifted, else 1."""
+        end = len(self.time) - 1
+        shifted = self.time[end] != self.instrument_time[end]
+        return float(self.instrument_time[end] / self.time[end]) if shifted else 1.0
+
+    @property
+    def unshifted(self) -> "RunRecord":
+        """The run with times and rates as the instrument had them."""
+        return replace(self, time=self.instrument_time, rate=self.rate / self.shift)
+
+    @property
+    def is_transient(self) -> bool:
+        """Whether it goes on in time, and is no steady or periodic state."""
+        return self.control not in STATES
+
+    @property
+    def along(self) -> tuple[str, Float[np.ndarray, " n"]]:
+        """What it is drawn against, and its values: time, shear rate, frequency or amplitude."""
+        return drawn_against(self.control, self.time, self.rate, self.strain)
+
+    @property
+    def residual(self) -> Float[np.ndarray, "stages n"]:
+        """Prediction minus measurement in Pa, for each model."""
+        return self.predicted - self.measured
+
+    @property
+    def relative_residual(self) -> Float[np.ndarray, "stages n"]:
+        """The residual over the root-mean-square stress."""
+        return self.residual / (rms(self.measured) or 1.0)
+
+
+def record_runs(
+    runs: Sequence[Run],
+    predictions: Float[np.ndarray, "stages runs n"],
+    held_out: bool,
+    order: Sequence[str] = (),
+) -> list[RunRecord]:
+    """Return each run with the predictions of several models, which are padded.
+
+    `order`: names of the runs of the data set, in its order.
+    """
+    records = []
+    for i, run in enumerate(runs):
+        predicted = predictions[:, i, : len(run)]
+        size = rms(run.recorded)
+        misfit = np.sqrt(np.mean((predicted - run.recorded) ** 2, axis=1))
+        conditions = {k: float(v) for k, v in run.metadata.items() if not isinstance(v, str)}
+        conditions.pop("n_points", None)  # of the file, not of the experiment
+        if run.name in order:
+            conditions["the order of the runs"] = float(list(order).index(run.name))
+        records.append(
+            RunRecord(
+                name=run.name,
+                held_out=held_out,
+                time=run.time,
+                strain=strain_of(run),
+                instrument_time=run.time / run.clock_factor,
+                rate=run.rate,
+                measured=run.recorded,
+                predicted=predicted,
+                errors=misfit / (size if size > 0 else 1.0),
+                conditions=conditions,
+                flow=run.flow,
+                quantity=run.quantity,
+                control=run.protocol.control,
+            )
+        )
+    return records
+
+
+def errors_of(records: Sequence[RunRecord], index: int) -> ErrorPair:
+    """Return the mean errors of one of the models in the records."""
+    fitted = [r.errors[index] for r in records if not r.held_out]
+    held = [r.errors[index] for r in records if r.held_out]
+    return ErrorPair(float(np.mean(fitted)), float(np.mean(held)) if held else None)

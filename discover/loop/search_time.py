@@ -24,35 +24,23 @@ class _Part(NamedTuple):
     share: float = 1.0
 
 
+# Fits of each further effect and of exchanged effects: at most so many, and for one candidate
 _DEEPER, _EXCHANGED, _EACH = 24.0, 70.0, 2.0
-"""Fits of each further effect and of exchanged effects: at most so many, and for one candidate."""
-
+# Fit of one effect over one of several, more of them being given up at once; fits of an exchanged
+# hypothesis
 _FIRST, _EXCHANGE = 0.8, 1.4
-"""Fit of one effect over one of several, more of them being given up at once; fits of an exchanged
-hypothesis."""
-
+# What is weighed after the search: with runs held out, when all are fitted again, or without
 _WEIGHED, _WEIGHED_ALONE = _Part(140.0, share=1.2), _Part(10.0)
-"""What is weighed after the search: with runs held out, when all are fitted again, or without."""
-
+# Curves of one variable; bands, intervals and the next test. All these were measured on two cores,
+# with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
+# two-mode PTT and noise. Seconds are those of the machine of `slowness`.
 _CURVES, _BANDS = _Part(20.0, 0.3, 1.2, 0.5), _Part(15.0, 0.5, 2.5, 0.7)
-"""Curves of one variable; bands, intervals and the next test. All these were measured on two cores,
-with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
-two-mode PTT and noise. Seconds are those of the machine of `slowness`."""
-
+# What is weighed after the second search, with more constants, over that after the first
 _SECOND = 1.3
-"""What is weighed after the second search, with more constants, over that after the first."""
-
+# Share of what follows a search where no effect is the likeliest: few hypotheses are near
 _FEW_NEAR = 0.2
-"""Share of what follows a search where no effect is the likeliest: few hypotheses are near."""
-
+# Least share of the time that fits are taken to have had, the rest being seconds besides
 _SLOW = 0.3
-"""Least share of the time that fits are taken to have had, the rest being seconds besides."""
-
-
-def _may_differ(names: str) -> bool:
-    """Return whether one of several effects has constants that may differ from mode to mode."""
-    known = {**built_in_effects(), **named_effects()}
-    return any(may_differ_by_mode(known[one]) for one in names.split(", ") if one in known)
 
 
 class SearchTime:
@@ -96,7 +84,10 @@ class SearchTime:
     def heard(self, line: str) -> float | None:
         """Return the seconds left after a line of the search; None before anything was fitted."""
         if likeliest := re.search(r"likeliest: (.*)", line):
-            self._follows = self._several_modes and _may_differ(likeliest[1])
+            known = {**built_in_effects(), **named_effects()}
+            names = (one for one in likeliest[1].split(", ") if one in known)
+            differ = any(may_differ_by_mode(known[one]) for one in names)
+            self._follows = self._several_modes and differ
             self._near = _FEW_NEAR if likeliest[1] == "none" else 1.0
         if found := re.search(r"search among (\d+)", line):
             self._search(float(found[1]))
@@ -163,24 +154,16 @@ class SearchTime:
         return self._near * sum(part.seconds + compiled * part.compiling for part in parts)
 
 
+# Seconds in which learners learn, and in which laws are weighed: a constant, and what compiling
+# adds, which a crowded machine prolongs, and a share of the search's. Measured on the demonstration
+# and on LDPE.
 _LEARN, _WEIGH = (2.4, 8.0, 0.2), (2.6, 5.6, 0.25)
-"""Seconds in which learners learn, and in which laws are weighed: a constant, and what compiling
-adds, which a crowded machine prolongs, and a share of the search's. Measured on the demonstration
-and on LDPE."""
-
-_SLOWER = 2.0
-"""Factor by which learning may change what is expected of weighing."""
-
-_LEAST = 0.15
-"""Share of a part's expected time that is still told of it once that time is over."""
+_SLOWER = 2.0  # Factor by which learning may change what is expected of weighing
+_LEAST = 0.15  # Share of a part's expected time that is still told of it once that time is over
 
 
 class ComparisonTime:
-    """Progress of a comparison.
-
-    `most`, `several_modes`, `held_out`, `clock`, `crowding`: as for `SearchTime`. `compiled`: share
-    of programs that have to be compiled.
-    """
+    """Progress of a comparison; parameters as of `SearchTime`."""
 
     def __init__(
         self,

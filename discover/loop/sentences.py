@@ -3,18 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
+from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
-from discover.loop.parts import Stage
-from discover.loop.run_record import RunRecord
-from discover.words import (
-    FIGURE_SYMBOLS,
-    effect_title,
-    effects_title,
-    percent_of,
-    significant,
-)
+from discover.loop.runs import RunRecord
 
 MOST_NAMES = 3
 
@@ -39,12 +32,12 @@ def untested_by(result: Any) -> str:
 def suspected(result: Any) -> list[Any]:
     """Return the effects that are no part of the fluid, those with a size and the surest first."""
     own = [stage for stage in result.stages if stage.kind != "constitutive"]
-    return sorted(own, key=lambda stage: (_may_be_zero(stage), -stage.evidence))
 
+    def order(stage: Any) -> tuple[bool, float]:
+        ends = next((one.ci95 for one in stage.parameters.values()), None) or (1.0, 1.0)
+        return ends[0] * ends[1] <= 0.0, -stage.evidence  # those that may be zero come last
 
-def _may_be_zero(stage: Any) -> bool:
-    ends = next((one.ci95 for one in stage.parameters.values()), None)
-    return ends is not None and ends[0] * ends[1] <= 0.0
+    return sorted(own, key=order)
 
 
 def doubted(result: Any) -> float | None:
@@ -82,16 +75,20 @@ def what_to_measure_next(result: Any) -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return _of_the_instrument(result) or _of_another_stress(result) or _by_geometry(result)
-    doubtful = _most_doubtful(result.stages)
+        if own := suspected(result):  # of the instrument
+            return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
+        return _of_another_stress(result) or _by_geometry(result)
+    # the stage to confirm first: one with aliases before one without
+    with_aliases = [stage for stage in result.stages if stage.aliases]
+    doubtful = next(iter([*with_aliases, *result.stages]), None)
     if (doubtful is None or not doubtful.aliases) and (told := _of_predicted_n1(result)):
         return told
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
-    check, title = _as_clause(doubtful.check), effect_title(doubtful.effect)
+    check, title = _as_clause(doubtful.check), words.effect_title(doubtful.effect)
     if not doubtful.aliases:
         return f"To confirm {title}, {check}."
-    others = several([*map(effect_title, doubtful.aliases)])
+    others = several([*map(words.effect_title, doubtful.aliases)])
     return f"To distinguish {title} from {others}, {check}."
 
 
@@ -102,30 +99,13 @@ def _fastest(records: Sequence[RunRecord]) -> str:
     fastest = max(records, key=lambda record: record.fastest)
     at = fastest.temperature_C
     place = "" if fastest.shift == 1.0 or at is None else f" and {degrees(at)}"
-    return f"{significant(fastest.unshifted.fastest, 2)} 1/s{place}"
+    return f"{words.significant(fastest.unshifted.fastest, 2)} 1/s{place}"
 
 
 def _as_clause(check: str) -> str:
     """Return the check of an effect as it goes on in a sentence; N2 keeps its capital."""
     check = check.rstrip(". ")
     return check if check[1:2].isdigit() else check[:1].lower() + check[1:]
-
-
-def _worst(result: Any) -> str:
-    """Return the fitted run that is missed most, by its own size."""
-    by_run = (result.discrepancy or {}).get("by_run", {})
-    fitted = [record for record in result.records if not record.held_out]
-    sheared = [record for record in fitted if record.flow == "shear"]  # in a gap
-    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in sheared or fitted}
-    return max(errors, key=lambda name: errors[name], default="one run")
-
-
-def _of_the_instrument(result: Any) -> str:
-    """Return how to check what is suspected of the instrument; empty where nothing is."""
-    first = next(iter(suspected(result)), None)
-    if first is None:
-        return ""
-    return f"To confirm {effect_title(first.effect)}, {_as_clause(first.check)}."
 
 
 def _of_another_stress(result: Any) -> str:
@@ -141,7 +121,7 @@ def _of_another_stress(result: Any) -> str:
         if apart is None or not result.tolerance < apart <= MUCH:
             continue
         if _is_in_reach(result, kind):
-            apart_by = f"equally good laws differ by {percent_of(apart)}"
+            apart_by = f"equally good laws differ by {words.percent_of(apart)}"
             return f"{title} at {_fastest(_sheared(result))}: {apart_by}."
     return ""
 
@@ -170,24 +150,27 @@ def _is_in_reach(result: Any, kind: str) -> bool:
     return thick and rate <= _FASTEST_EXTENSION
 
 
+# Extension rate in 1/s that rheometers do not exceed [Sentmanat 2004, Rheol. Acta 43, 657].
 _FASTEST_EXTENSION = 30.0
-"""Extension rate in 1/s that rheometers do not exceed [Sentmanat 2004, Rheol. Acta 43, 657]."""
-
+# Tensile stress over rate in Pa s below which a strip does not keep its shape until it is drawn:
+# instruments for extension at a given rate take melts   [Sentmanat 2004]
 _LEAST_TENSILE_VISCOSITY = 1e3
-"""Tensile stress over rate in Pa s below which a strip does not keep its shape until it is drawn:
-instruments for extension at a given rate take melts   [Sentmanat 2004]."""
-
+# N1 in Pa below which no rheometer tells it: axial transducers resolve some 1e-3 N, and N1 is
+# 2F/(πR²) on a cone of R = 25 mm   [Macosko 1994, Rheology, ch. 8].
 _LEAST_NORMAL_STRESS = 1.0
-"""N1 in Pa below which no rheometer tells it: axial transducers resolve some 1e-3 N, and N1 is
-2F/(πR²) on a cone of R = 25 mm   [Macosko 1994, Rheology, ch. 8]."""
-
+# Stresses that tell laws apart which agree in σ12, the easier measurement first
 _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
-"""Stresses that tell laws apart which agree in σ12, the easier measurement first."""
 
 
 def _by_geometry(result: Any) -> str:
-    """Return which run to repeat where nothing says whether instrument or fluid is amiss."""
-    run = _worst(result)
+    """Return which run to repeat where nothing says whether instrument or fluid is amiss.
+
+    The fitted one that is missed most, by its own size.
+    """
+    by_run = (result.discrepancy or {}).get("by_run", {})
+    fitted = [record for record in result.records if not record.held_out]
+    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in _sheared(result) or fitted}
+    run = max(errors, key=lambda name: errors[name], default="one run")
     return f"Repeat {run} with another gap, to separate instrument and fluid."
 
 
@@ -197,18 +180,12 @@ def _telling_test(result: Any) -> str:
     best = following.best
     if best is None:
         return ""
-    titles = [effects_title(effects) for effects in following.explanations]
+    titles = [words.effects_title(effects) for effects in following.explanations]
     first, *_ = best.pairs
     chosen = first[0]
     others = several([titles[j] for i, j in best.pairs if i == chosen])
-    what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
+    what = f" ({words.FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
     title = f"{best.title[:1].upper()}{best.title[1:]}"
     if any(record.shift != 1.0 for record in result.records):
         title += f", reduced to {reduced_to(result)}"
     return f"{title}{what}: it should distinguish {titles[chosen]} from {others}."
-
-
-def _most_doubtful(stages: Sequence[Stage]) -> Stage | None:
-    """Return the stage to confirm first: one with aliases before one without."""
-    with_aliases = [stage for stage in stages if stage.aliases]
-    return next(iter([*with_aliases, *stages]), None)

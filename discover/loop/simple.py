@@ -8,20 +8,15 @@ from discover.answer.simple_material import SimpleMaterial, material_of, recogni
 from discover.dataset import Run
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.inference.engine.inelastic import Inelastic
-from discover.loop.constants import StageParameter
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import Explanation, Explanations, Stage
-from discover.loop.run_record import RunRecord, errors_of, record_runs
-from discover.loop.runs import why_untested
+from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
+from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
 from discover.statistics.residual import fast_part
 
+# Effect that is all that such a material has; another law stands for itself
 _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
-"""Effect that is all that such a material has; another law stands for itself."""
-
-_ALREADY = ("saramito",)
-"""Laws that hold a yield stress themselves."""
-
+_ALREADY = ("saramito",)  # Laws that hold a yield stress themselves
 _AS_WELL = 1.1
 
 

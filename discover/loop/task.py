@@ -28,8 +28,7 @@ from discover.laws.registry import starting_values
 from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
-from discover.loop.run_record import errors_of
-from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.runs import MOST_SAMPLES, errors_of, require_samples, split_runs
 from discover.words import unknown_name
 
 Say = Callable[[str], None]
@@ -37,9 +36,7 @@ Say = Callable[[str], None]
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
 
-_AT_END = 1e-3
-"""Share of its range within which a constant stands at an end."""
-
+_AT_END = 1e-3  # Share of its range within which a constant stands at an end
 _DIVERGES = "its stress diverges. Check its parameters, modes and units."
 
 
@@ -125,7 +122,8 @@ class Task:
         """
         problem = self.problem(declared)
         self.say(f"search among {len(problem.candidates)} effects")
-        if not is_sound(problem):
+        # the model without any effect
+        if not np.all(np.isfinite(Fitter(problem, problem.fitted).predict([problem.zero]))):
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
             )
@@ -204,12 +202,6 @@ def log_evidence(search: Search) -> float:
     """Return the log of evidence times prior of all hypotheses of a search together."""
     alive = search.alive()
     return float(np.logaddexp.reduce([search.rank(fit) for fit in alive])) if alive else -np.inf
-
-
-def is_sound(problem: Problem) -> bool:
-    """Return whether the model without any effect can be integrated through the fitted runs."""
-    predicted = Fitter(problem, problem.fitted).predict([problem.zero])
-    return bool(np.all(np.isfinite(predicted)))
 
 
 def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
@@ -311,10 +303,8 @@ def further_candidates(
 ) -> list[AbstractEffect]:
     """Return the effects that are asked for and that the declared model does not know.
 
-    `effects`: as `candidates_of` takes them. `runs`: those that are fitted and those that judge.
-
-    Raises InputError if they are not as `candidates_of` takes them, an effect by mode is neither
-    declared nor among them, or the rates of the runs contain a known effect already.
+    Raises InputError as `candidates_of`, or if an effect by mode is neither declared nor among
+    them, or the rates of the runs, fitted or held out, contain a known effect already.
     """
     candidates = candidates_of(effects)
     known = {effect.name for effect in declared.effects}

@@ -5,11 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from discover.dataset.checking.runs import Finding
-from discover.dataset.dataset import Dataset
-from discover.dataset.linear_viscoelasticity import relaxation_spectrum
+from discover.dataset import Dataset, Finding, Run, relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
-from discover.dataset.run import Run
 from discover.dataset.run_table import material_and_temperature, run_line
 from discover.dataset.tables.table import toml_string
 from discover.errors import InputError

@@ -16,10 +16,10 @@ from discover.errors import InputError
 from discover.fitting import NamedLawFit
 from discover.learners.run_prediction import RunPrediction
 from discover.loop.loop_result import LoopResult
-from discover.loop.run_record import record_runs
+from discover.loop.runs import record_runs
 from discover.plain_numbers import json_text
 from discover.report.comparison.report import write_comparison
-from discover.report.loop.report import write_loop
+from discover.report.loop import write_loop
 from discover.report.page import answer_screen, made_by, render
 from discover.report.plots.comparison.flows import drawn_records
 from discover.report.plots.loop.runs import FITTED_LAW, drawn_runs
@@ -32,8 +32,9 @@ _PAGE = "report.html"
 class _PageAlone(RunFolder):
     """Takes what a report writes and keeps the page; there is no folder."""
 
-    def __init__(self, fingerprint: str):
-        self.fingerprint = fingerprint
+    def __init__(self, result: Comparison | LoopResult):
+        text = json.dumps(result.to_json(), sort_keys=True, default=str)
+        self.fingerprint = hashlib.sha256(text.encode()).hexdigest()[:16]
         self.page = ""
 
     def write(self, name: str, text: str) -> Path:
@@ -44,7 +45,7 @@ class _PageAlone(RunFolder):
 
 def comparison_page(comparison: Comparison) -> str:
     """Return the report on a comparison as one page."""
-    kept = _PageAlone(_fingerprint(comparison.to_json()))
+    kept = _PageAlone(comparison)
     relaxes = comparison.known is None or comparison.known.linear_relaxation
     run = made_by(kept.fingerprint, "discover.compare(...) in Python", (), "")
     write_comparison(comparison, kept, relaxes, run=run)
@@ -53,15 +54,10 @@ def comparison_page(comparison: Comparison) -> str:
 
 def loop_page(result: LoopResult) -> str:
     """Return the report on a closed loop as one page."""
-    kept = _PageAlone(_fingerprint(result.to_json()))
+    kept = _PageAlone(result)
     run = made_by(kept.fingerprint, "discover.close_loop(...) in Python", (), "")
     write_loop(result, kept, result.title or "closed loop", result.described, run=run)
     return kept.page
-
-
-def _fingerprint(content: dict[str, Any]) -> str:
-    text = json.dumps(content, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def fit_page(fit: NamedLawFit) -> str:

@@ -23,8 +23,7 @@ _REPLACEMENTS = (
 )
 
 
-_TEXT = 12.0
-"""Size of text in points."""
+_TEXT = 12.0  # Size of text in points
 
 
 def formula(latex: str, name: str, size: float = _TEXT) -> str:

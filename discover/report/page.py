@@ -15,51 +15,21 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 
+from discover import words
 from discover._version import __version__
-from discover.answer import Answer, Constant, Suspect
-from discover.answer.modes_in_words import (
-    FEW_MODES,
-    as_constant,
-    degrees,
-    in_order,
-    linear_part,
-    reduced_to,
-    shifts,
-    shortened,
-)
-from discover.answer.sentences import (
-    CLASSICAL,
-    NOT_SEPARABLE,
-    SUSPECTED,
-    SYMBOLS,
-    error_title,
-    expected,
-    is_a_set,
-    law,
-    note,
-    quality,
-    separable,
-    worst_run,
-)
+from discover.answer import Answer, Constant, Suspect, sentences
+from discover.answer import modes_in_words as modes
 from discover.effects import StateEffect
-from discover.equations import Equation
-from discover.equations.files import FORMATS
-from discover.equations.spelling.markup import law_element
+from discover.equations import FORMATS, Equation
+from discover.equations.spelling.markup import law_element, term_element
 from discover.errors import InputError
+from discover.learners.registry import learner_title
 from discover.plain_numbers import json_text
+from discover.protocols.kinematics import in_words
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
-from discover.report.wording import percent, percent_range
-from discover.words import (
-    LEVEL,
-    effect_title,
-    estimate,
-    interval,
-    listed,
-    percent_of,
-    readable,
-    significant,
-)
+from discover.report.wording import parameter_name, percent, percent_range
+from discover.statistics.noise.noise_model import rms
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -86,13 +56,8 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
     }
 
 
-def _as_link(name: str) -> str:
-    """Return a file's name as it stands in a link, be it UTF-8 or not."""
-    return quote(os.fsencode(name))
-
-
+# Characters of a file that a page carries; more would make the page slow to open
 _MOST_INSIDE = 3_000_000
-"""Characters of a file that a page carries; more would make the page slow to open."""
 
 
 def render(template: str, data: Mapping[str, str] | None = None, **content: Any) -> str:
@@ -100,9 +65,8 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
 
     Everything is escaped except pictures and mathematics that this package wrote itself.
 
-    `template`: file in ``templates``. `data`: text of files that each picture links to, by name.
-    The page carries those that are not too long, so that it hands them out where it stands alone;
-    the others lie in its folder. `content`: its variables.
+    `data`: text of files that each picture links to, by name. The page carries those that are not
+    too long, so that it hands them out where it stands alone; the others lie in its folder.
     """
     carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (
@@ -130,16 +94,31 @@ def _environment() -> Environment:
     environment.filters.update(
         percent=percent,
         percent_range=percent_range,
-        significant=significant,
-        interval=interval,
-        estimate=estimate,
-        readable=readable,
+        significant=words.significant,
+        interval=words.interval,
+        estimate=words.estimate,
+        readable=words.readable,
         subscripts=_subscripts,
         explained=_explained,
-        file_name=_file_name,
+        # a name of a file may break behind an underscore
+        file_name=lambda text: Markup(str(escape(text)).replace("_", "_<wbr>")),
         safe_svg=Markup,
-        as_link=_as_link,
+        as_link=lambda name: quote(os.fsencode(name)),  # be it UTF-8 or not
         in_units=in_units,
+        unbroken=_unbroken,
+        in_cell=_in_cell,
+        formula=formula,
+        safe_name=safe_name,
+        parameter_name=parameter_name,
+        effect_title=words.effect_title,
+        effects_title=words.effects_title,
+        rms=rms,
+        term_element=term_element,
+        learner_title=learner_title,
+        quantities=in_words,
+    )
+    environment.globals.update(
+        answer_sentences=sentences, modes=modes, symbols=words.FIGURE_SYMBOLS
     )
     return environment
 
@@ -174,8 +153,6 @@ def attempt(title: str, draw: Callable[[], Part]) -> Part | Missing:
     A report comes after minutes or hours of computing, and its numbers lie in JSON already. No
     fault of one picture or table is worth the rest of the page. The logger of this module has the
     traceback, at level debug.
-
-    `title`: the part, as the subject of a sentence. `draw`: makes it.
     """
     try:
         return draw()
@@ -185,73 +162,50 @@ def attempt(title: str, draw: Callable[[], Part]) -> Part | Missing:
         return Missing(title, f"{type(error).__name__}, {text}" if text else type(error).__name__)
 
 
+# Buttons, with the formats that they copy; JSON is that of the answer
 _COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
-"""Buttons, with the formats that they copy; JSON is that of the answer."""
 
 
 def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
     if answer is None:
         return None
-    found: dict[str, Any] = {
-        "title": (answer.title or answer.instead.lower()).partition(":")[0],
-        "headline": _unbroken(law(answer)),
-        "quality": _unbroken(quality(answer)),
-        "level": LEVEL,
-        "errors": error_title(answer).lower(),
-        "open": not answer.title or answer.adequate is False,
-        "law": "", "constants": (), "suspects": (), "suspected": SUSPECTED.lower(),
-        "expected": (), "modes": (), "linear": "", "few": 0, "solvent": "", "set": False,
-        "copies": (), "missing": "",
-        "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
-        "behind": _unbroken(answer.alternative),
-        "next_test": _unbroken(answer.next_test),
-    }  # fmt: skip
-    if not answer.title:
-        return found
-    solvent = answer.solvent_viscosity_Pa_s
-    symbols = [one.symbol for one in answer.constants]
+    headline, symbols = _unbroken(sentences.law(answer)), [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
         # terms as the equation in Pa and s has them: over the stress of a mode in units of G
         for i, one in enumerate(answer.constants):
             if one.is_term:
                 symbols[i] = one.symbol.replace("σ", "τ")
-                found["headline"] = found["headline"].replace(one.symbol, symbols[i])
-    return found | {
+                headline = headline.replace(one.symbol, symbols[i])
+    reduced = modes.reduced_to(answer)
+    shifted = [
+        ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)} than at {reduced}",
+         words.significant(one, 3), "") for at, one in modes.shifts(answer)
+    ]  # fmt: skip
+    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
+    clock = "; times on the instrument's clock" if timed and answer.shift_factors else ""
+    return {
+        "answer": answer,
+        "title": (answer.title or answer.instead.lower()).partition(":")[0],
+        "headline": headline,
+        "quality": _unbroken(sentences.quality(answer)),
+        "errors": sentences.error_title(answer).lower(),
+        "open": not answer.title or answer.adequate is False,
         "law": _typeset(answer),
         "constants": [
-            (symbol, _unbroken(_said(one)), _in_cell(one.number), _in_cell(one.interval))
-            for symbol, one in zip(symbols, answer.constants, strict=True)
-        ]
-        + [
-            (
-                "a_T",
-                f"at {degrees(at)}: times {shortened(one)} than at {reduced_to(answer)}",
-                significant(one, 3),
-                "",
-            )
-            for at, one in shifts(answer)
+            *((symbol, _unbroken(_said(one)), _in_cell(one.number), _in_cell(one.interval))
+              for symbol, one in zip(symbols, answer.constants, strict=True)),
+            *shifted,
         ],
-        "set": is_a_set(answer),
-        "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
-        "suspected": SUSPECTED.lower() + _clock(answer),
-        "expected": _expected(answer) + _worst(answer),
-        "modes": [
-            tuple(as_constant(answer, one) for one in (mode.modulus_Pa, mode.relaxation_time_s))
-            for mode in in_order(answer)
-        ],
-        "linear": _unbroken(linear_part(answer)),
-        "few": FEW_MODES,
-        "solvent": _in_cell(f"{as_constant(answer, solvent)} Pa s") if solvent else "",
-        "copies": (copies := _copies(answer)),
+        "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
+        "suspected": sentences.SUSPECTED.lower() + clock,
+        "expected": [*_expected(answer), *_worst(answer)] if answer.title else (),
+        "copies": (copies := _copies(answer) if answer.title else []),
+        "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "missing": _not_there(copies),
-    }
-
-
-def _clock(answer: Answer) -> str:
-    """Return that times of the instrument are its own where those of the law are shifted."""
-    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
-    return "; times on the instrument's clock" if timed and answer.shift_factors else ""
+        "behind": _unbroken(answer.alternative),
+        "next_test": _unbroken(answer.next_test),
+    }  # fmt: skip
 
 
 def _said(one: Constant) -> str:
@@ -264,15 +218,15 @@ def _said(one: Constant) -> str:
 def _expected(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of expected errors; quantities that nothing is known of share one."""
     found: list[dict[str, Any]] = []
-    for name, symbol in SYMBOLS.items():
+    for name, symbol in sentences.SYMBOLS.items():
         one = answer.expected(name)
         row = {
             "symbol": symbol,
-            "inside": _in_cell(expected(one, "inside")),
-            "beyond": _in_cell(expected(one, "beyond")),
+            "inside": _in_cell(sentences.expected(one, "inside")),
+            "beyond": _in_cell(sentences.expected(one, "beyond")),
             "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
             "known": one.is_known,
-            "note": _unbroken(note(answer, name)),
+            "note": _unbroken(sentences.note(answer, name)),
         }
         if found and not one.is_known and found[-1] == row | {"symbol": found[-1]["symbol"]}:
             found[-1]["symbol"] += f", {symbol}"
@@ -283,25 +237,27 @@ def _expected(answer: Answer) -> list[dict[str, Any]]:
 
 def _worst(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of the run that is missed most, if it is, and of the best classical law."""
-    told = [] if (worst := worst_run(answer)) is None else [("worst run in range", *worst)]
+    told = (
+        [] if (worst := sentences.worst_run(answer)) is None else [("worst run in range", *worst)]
+    )
     if answer.best_classical is not None:
         near, error = answer.best_classical
-        told.append((CLASSICAL.lower(), near, percent_of(error)))
+        told.append((sentences.CLASSICAL.lower(), near, words.percent_of(error)))
     return [
-        {"symbol": symbol, "note": _unbroken(note), "inside": _in_cell(error), "beyond": "",
+        {"symbol": symbol, "note": _unbroken(said), "inside": _in_cell(error), "beyond": "",
          "beyond_at": "", "known": True}
-        for symbol, note, error in told
+        for symbol, said, error in told
     ]  # fmt: skip
 
 
-def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
+def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
     """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
-    title = effect_title(one.effect)
-    if one.amplitude is None or not separable:
-        return title, "", "" if separable else NOT_SEPARABLE, ""
-    note = one.amplitude.meaning if one.amplitude.unit == "%" else ""
-    note = note if one.is_established else "; ".join(filter(None, [note, "may be zero"]))
-    return title, note, _in_cell(one.amplitude.number), _in_cell(one.amplitude.interval)
+    title = words.effect_title(one.effect)
+    if one.amplitude is None or not has_size:
+        return title, "", "" if has_size else sentences.NOT_SEPARABLE, ""
+    said = one.amplitude.meaning if one.amplitude.unit == "%" else ""
+    said = said if one.is_established else "; ".join(filter(None, [said, "may be zero"]))
+    return title, said, _in_cell(one.amplitude.number), _in_cell(one.amplitude.interval)
 
 
 def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
@@ -310,7 +266,7 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
     if not grey:
         return ""
     reason = grey[0]["reason"].partition(". ")[0].rstrip(".").rpartition(": ")[2]
-    names = listed([one["name"] for one in grey])
+    names = words.listed([one["name"] for one in grey])
     if any(one["name"] in reason for one in grey):
         return f"{reason}."
     return f"Cannot be exported to {names}: {reason[:1].lower()}{reason[1:]}."
@@ -367,11 +323,6 @@ def _in_cell(text: str) -> str:
     return re.sub("(×\N{NO-BREAK SPACE}10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)\N{NO-BREAK SPACE}", r"\1 ", whole)
 
 
-def _file_name(text: str) -> Markup:
-    """Return a note, escaped, in which a name of a file may break behind an underscore."""
-    return Markup(str(escape(text)).replace("_", "_<wbr>"))
-
-
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
     lines = answer.written.get("formula", "").splitlines()
@@ -401,8 +352,7 @@ def _rounded(equation: Equation, answer: Answer) -> Equation:
     return replace(equation, terms=terms, named=named)
 
 
-_LARGE = 15.0
-"""Size in points of an equation that the answer rests on."""
+_LARGE = 15.0  # Size in points of an equation that the answer rests on
 
 
 def _formulas(lines: Sequence[str]) -> str:
@@ -416,19 +366,19 @@ def _formulas(lines: Sequence[str]) -> str:
 
 def _law(equation: Equation, rest: bool = False) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
-    modes = len(equation.modulus)
+    count = len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
-        law = law_element(
-            equation.terms, equation.linear_relaxation, equation.named, modes, solvent, rest
+        text = law_element(
+            equation.terms, equation.linear_relaxation, equation.named, count, solvent, rest
         )
         # what a state of the whole fluid does stands below the law of a mode
-        index = "_k" if modes > 1 else ""
+        index = "_k" if count > 1 else ""
         parts = [
             one.equation.replace("_k", index) + _at_rest(one.states, part.own)
             for one, part in zip(equation.spelled_states, equation.states, strict=True)
         ]
-        return law + _formulas(parts)
+        return text + _formulas(parts)
     except InputError:  # nobody said how a law of their own is written
         return ""
 

@@ -1,6 +1,6 @@
 """``predictions.csv``: every curve that a report draws, one line a sample."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ POSTERIOR = "posterior"
 _ROLES = {"training": "fit", "held_out": "held_out", "test": "prediction"}
 _ROLES["high_deborah"] = "prediction"
 _SOURCES = {"before": "declared"}
+_NO_CLAIM = (np.nan, np.nan)
 
 
 def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
@@ -40,43 +41,26 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
 
     Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` are the 95 % band of the
     posterior; the sparse law has it where the quantity is determined, else NaN, as has ``measured``
-    where nothing was.
-    A law that cannot be integrated through a flow has no line there.
-
-    `comparison`: flows over which only errors are mapped are left out.
+    where nothing was. Flows over which only errors are mapped are left out, and a law has no line
+    in a flow that it cannot be integrated through.
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}
     curves[POSTERIOR] = {key: band.middle for key, band in comparison.bands.items()}
-    parts = []
+    rows = []
     for flow in comparison.flows:
-        if flow.kind not in _ROLES:
-            continue
-        for who, predictions in curves.items():
-            predicted = predictions.get(flow.key)
-            if predicted is None:
-                continue
-            limits = _limits(comparison, who, flow)
+        for who, predictions in curves.items() if flow.kind in _ROLES else ():
+            predicted, limits = predictions.get(flow.key), _limits(comparison, who, flow)
             for quantity in QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]:
-                if quantity not in predicted:
+                if predicted is None or quantity not in predicted:
                     continue
-                low, high = limits.get(quantity, (np.nan, np.nan))
-                parts.append(
-                    _lines(
-                        run=flow.name,
-                        role=_ROLES[flow.kind],
-                        time_s=flow.times,
-                        strain=flow.strain,
-                        rate_1_s=flow.rate,
-                        quantity=quantity if flow.records_shear_stress else flow.protocol.quantity,
-                        source=_SOURCES.get(who, who),
-                        value=predicted[quantity],
-                        low95=low,
-                        high95=high,
-                        measured=_measured(flow, quantity),
-                    )
-                )
-    return _table(parts)
+                recorded = quantity if flow.records_shear_stress else flow.protocol.quantity
+                rows.append((
+                    flow.name, _ROLES[flow.kind], flow.times, flow.strain, flow.rate, recorded,
+                    _SOURCES.get(who, who), predicted[quantity], *limits.get(quantity, _NO_CLAIM),
+                    _measured(flow, quantity),
+                ))  # fmt: skip
+    return _table(rows)
 
 
 def loop_predictions(result: LoopResult) -> pd.DataFrame:
@@ -86,7 +70,7 @@ def loop_predictions(result: LoopResult) -> pd.DataFrame:
     The limits hold where 95 % of the measurements should lie by all explanations together; they
     stand with the model that was found.
     """
-    return _table([part for r in result.records for part in _record_parts(r)])
+    return _table([row for record in result.records for row in _rows_of(record)])
 
 
 def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
@@ -97,27 +81,17 @@ def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
     return text
 
 
-def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
+def _rows_of(record: RunRecord) -> Iterator[tuple]:
     sources = {"declared": record.predicted[0]}
     if len(record.predicted) > 1:
         sources["augmented"] = record.predicted[-1]
-    found = [*sources][-1]
     for source, predicted in sources.items():
-        band = record.band if source == found else None
-        low, high = (np.nan, np.nan) if band is None else band
-        yield _lines(
-            run=record.name,
-            role="held_out" if record.held_out else "fit",
-            time_s=record.time,
-            strain=record.strain,
-            rate_1_s=record.rate,
-            quantity=record.quantity,
-            source=source,
-            value=predicted,
-            low95=low,
-            high95=high,
-            measured=record.measured,
-        )
+        band = record.band if source == [*sources][-1] else None
+        yield (
+            record.name, "held_out" if record.held_out else "fit", record.time, record.strain,
+            record.rate, record.quantity, source, predicted,
+            *(_NO_CLAIM if band is None else band), record.measured,
+        )  # fmt: skip
 
 
 def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[Any, Any]]:
@@ -140,9 +114,7 @@ def _measured(flow: Flow, quantity: str) -> Any:
     return np.nan if flow.is_truth else flow.reference.get(quantity, np.nan)
 
 
-def _lines(**columns: Any) -> pd.DataFrame:
-    return pd.DataFrame({name: columns[name] for name in COLUMNS})
-
-
-def _table(parts: list[pd.DataFrame]) -> pd.DataFrame:
+def _table(rows: Sequence[tuple]) -> pd.DataFrame:
+    """Return rows of scalars and columns, in the order of `COLUMNS`, as one table."""
+    parts = [pd.DataFrame(dict(zip(COLUMNS, row, strict=True))) for row in rows]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(COLUMNS))

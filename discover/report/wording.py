@@ -4,21 +4,12 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from discover import words
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.loop import FreeForm
+from discover.loop.parts import ConstantByMode, StageParameter
 from discover.protocols.kinematics import MODULI
-from discover.words import (
-    FIGURE_SYMBOLS,
-    LEVEL,
-    effect_title,
-    estimate,
-    interval,
-    percent_of,
-    readable,
-)
-
-SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
 
 def recorded_symbol(quantities: Iterable[str]) -> str:
@@ -26,7 +17,7 @@ def recorded_symbol(quantities: Iterable[str]) -> str:
     found = set(quantities)
     if len(found) > 1:
         return "modulus" if found <= set(MODULI) else "stress"
-    return FIGURE_SYMBOLS[found.pop()]
+    return words.FIGURE_SYMBOLS[found.pop()]
 
 
 SMALL_FAULTS = (
@@ -60,7 +51,7 @@ def percent(value: float | None) -> str:
         return "–"
     if value != 0 and abs(value) < 1e-5:
         return "< 0.001 %"
-    return percent_of(value)
+    return words.percent_of(value)
 
 
 def percent_range(values: Sequence[float | None] | None) -> str:
@@ -92,9 +83,9 @@ def terms_text(outcome: LearnerOutcome) -> str:
         return "nothing but the known part"
     parts = []
     for term in outcome.terms:
-        text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
+        text = f"{words.estimate(term.coefficient, term.ci95)} {_factor(words.readable(term.term))}"
         if term.ci95 is not None:
-            text += f" ({LEVEL} {interval(term.ci95)})"
+            text += f" ({words.LEVEL} {words.interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)
 
@@ -103,6 +94,15 @@ def _factor(text: str) -> str:
     """Return a term as a number may stand before it: a sum in brackets, unless it has them."""
     outside = re.sub(r"\([^()]*\)", "", text)
     return f"({text})" if "+" in outside or "−" in outside else text
+
+
+def parameter_name(name: str, parameter: StageParameter) -> str:
+    """Return the name of a parameter, of one by mode in the field's letters with its mean time."""
+    if not isinstance(parameter, ConstantByMode):
+        return name
+    text = words.readable(name.replace("_", " ").replace("build up", "build-up"))
+    time = words.significant(parameter.mean_time_s, 3)
+    return f"{text} (varies from mode to mode) at λ = {time} s"
 
 
 _WHAT = {
@@ -122,7 +122,7 @@ _WHAT = {
 
 def free_form_sentence(found: FreeForm) -> str:
     """Return what a free function is and where it stands, without a full stop."""
-    effects = " and ".join(map(effect_title, found.beside)) or "your model"
+    effects = " and ".join(map(words.effect_title, found.beside)) or "your model"
     shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
     what = _WHAT[found.slot].format(variable=found.variable)
     return f"{what}{shape}, with {effects} explains the residual"

@@ -9,24 +9,21 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.dataset import Dataset, LinearSweep
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset import Dataset, LinearSweep, RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.run import SLOWEST_RATE, Run
 from discover.effects import ConstitutiveEffect, KnownEffect, known_effects
 from discover.equations import AugmentedLaw, Equation
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.laws.each_mode import law_of_each_mode
-from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_value
-from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Model, Study
 from discover.words import counted, percent_of
 
+# Longest runs, and slowest modes, within which a declared elastic constant does not relax
 _UNRELAXED = 1e3
-"""Longest runs, and slowest modes, within which a declared elastic constant does not relax."""
 
 MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 """Constants of the modes that may be left to be fitted."""
@@ -234,8 +231,8 @@ def _law_of_each_mode(
     return law_of_each_mode(laws)
 
 
+# Relative difference of relaxation times that were written to a file and read again
 _SAME_MODES = 1e-6
-"""Relative difference of relaxation times that were written to a file and read again."""
 
 
 def _spectrum_of(

@@ -11,8 +11,7 @@ import numpy as np
 
 from discover.effects import KnownEffect, known_effects
 from discover.equations import Equation
-from discover.equations.files import COMPARISON, LOOP, read_json
-from discover.equations.formats.json_format import equation_from_json
+from discover.equations.files import COMPARISON, LOOP, equation_from_json, read_json
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.study.run_folder import STATE_FILE, STATE_FOLDER

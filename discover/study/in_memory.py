@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discover.dataset import Dataset, Run
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
+from discover.dataset import Dataset, RelaxationSpectrum, Run
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
@@ -95,10 +94,7 @@ def declared_fluid(base: Any, data: Dataset) -> StudyModel:
 
 
 def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
-    """Return the study that would ask for the same with files.
-
-    `asked`: sections of it besides ``[data]``. `where`: the call, as an error names it.
-    """
+    """Return the study that would ask for the same with files: `asked`, besides ``[data]``."""
     source: dict[str, Any] = {"folder": data.name or "data in memory"}
     if isinstance(data, SyntheticDataset) and data.truth is not None:
         found = name_of(data.truth.law)

@@ -1,6 +1,6 @@
 """The study file: what may be written in it, and nothing else."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,21 +14,10 @@ from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS, make_law, starting_value
 from discover.learners.registry import learner_names
 from discover.learners.settings import DEFAULT_DEGREE
-from discover.validation import Section
-from discover.words import unknown_name
+from discover.validation import Section, one_of
 from tensor_library.closed_forms import CLOSED_FORMS
 
-
-def _one_of(kind: str, known: Callable[[], Iterable[str]]) -> Callable[[str], str]:
-    def check(name: str) -> str:
-        if name not in known():
-            raise ValueError(unknown_name(kind, name, known()))
-        return name
-
-    return check
-
-
-_known_law = _one_of("law", lambda: LAWS)
+_known_law = one_of("law", lambda: LAWS)
 
 
 def _known_law_or_several(given: Any) -> Any:
@@ -39,8 +28,8 @@ def _known_law_or_several(given: Any) -> Any:
     return given if given in (ANY, "learned") else _known_law(str(given))
 
 
-ClosedFormName = Annotated[str, AfterValidator(_one_of("closed form", lambda: CLOSED_FORMS))]
-LearnerName = Annotated[str, AfterValidator(_one_of("learner", learner_names))]
+ClosedFormName = Annotated[str, AfterValidator(one_of("closed form", lambda: CLOSED_FORMS))]
+LearnerName = Annotated[str, AfterValidator(one_of("learner", learner_names))]
 SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
 LawNames = Annotated[str | tuple[str, ...], BeforeValidator(_known_law_or_several)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes

@@ -24,8 +24,7 @@ from discover.equations import Tested as Where
 from discover.equations.files import read_result_laws
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
-from discover.loop.constants import ConstantByMode, ModeConstant
-from discover.loop.parts import DeclaredEffect, NearestLaw
+from discover.loop.parts import ConstantByMode, DeclaredEffect, ModeConstant, NearestLaw
 from tensor_library import LawTerm
 
 

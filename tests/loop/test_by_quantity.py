@@ -13,7 +13,7 @@ from discover.loop.expected_errors import Spread
 from discover.loop.fitted_range import range_of
 from discover.loop.from_posterior import Ended
 from discover.loop.parts import ErrorPair, Stage
-from discover.loop.run_record import RunRecord
+from discover.loop.runs import RunRecord
 from discover.loop.sentences import what_to_measure_next
 
 NOISE = 0.03

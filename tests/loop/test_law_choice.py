@@ -16,7 +16,7 @@ from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import weights_of
 from discover.loop.preference import first_of, is_thixotropic_maxwell, law_of
 from discover.loop.task import candidates_of
-from discover.report.loop.tables import loop_verdict
+from discover.report.loop import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
 NOISE = 0.005

@@ -8,7 +8,7 @@ import discover as dc
 from discover.dataset import Dataset, Run
 from discover.protocols import imposed_stress, oscillatory_shear
 from discover.protocols import start_up as protocol
-from discover.report.loop.tables import how_sure
+from discover.report.loop import how_sure
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {

@@ -9,7 +9,7 @@ from scipy.integrate import odeint
 from discover.dataset import Dataset, Run
 from discover.loop import DeclaredModel, run_loop
 from discover.protocols import oscillatory_shear, start_up
-from discover.report.loop.tables import loop_verdict
+from discover.report.loop import loop_verdict
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 TIMES = np.linspace(0.1, 10.0, 100)

@@ -8,7 +8,7 @@ from independent import start_up as flow_at
 import discover as dc
 from discover.dataset.records.repeats import count_flows
 from discover.protocols.control import steady_rates
-from discover.report.loop.tables import loop_verdict
+from discover.report.loop import loop_verdict
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 TIMES = np.linspace(0.1, 6.0, 40)

@@ -17,7 +17,7 @@ import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flows import RateSteps
 from discover.loop.measured_rates import with_places, with_rate_steps
-from discover.report.loop.tables import loop_verdict
+from discover.report.loop import loop_verdict
 
 MODULUS, TIME, MOBILITY, NOISE = 100.0, 1.0, 0.3, 0.01
 INSTANTS = {"up.csv": 4.01, "down.csv": 3.99, "stop.csv": 4.02, "judge.csv": 3.02}

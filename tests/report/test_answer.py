@@ -14,8 +14,7 @@ from discover.answer.simple_material import material_of
 from discover.equations import Equation
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
-from discover.loop.constants import StageParameter
-from discover.loop.parts import STRUCTURES, NearestLaw
+from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
 from discover.report.page import answer_screen
 from discover.study.schema import Verdict
 from discover.validation import validated

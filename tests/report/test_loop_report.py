@@ -10,10 +10,15 @@ from standing_alone import stands_alone
 
 from discover.effects import make_effect
 from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stage
-from discover.loop.constants import ConstantByMode, ModeConstant, StageParameter
-from discover.loop.parts import Explanation, Explanations, Fold
-from discover.report.loop.report import write_loop
-from discover.report.loop.tables import loop_verdict, noise_range, remaining_rows
+from discover.loop.parts import (
+    ConstantByMode,
+    Explanation,
+    Explanations,
+    Fold,
+    ModeConstant,
+    StageParameter,
+)
+from discover.report.loop import loop_verdict, noise_range, remaining_rows, write_loop
 from discover.report.page import render
 from discover.report.plots.loop.residual import (
     residual_picture,

@@ -311,7 +311,7 @@ def test_a_comparison_shows_itself_as_tables(comparison):
 def test_reports_leave_a_notebook_its_pictures():
     """Reports once changed matplotlib's backend, and a notebook showed no picture from then on."""
     code = "import matplotlib; matplotlib.use('agg'); import discover.report.comparison.report; "
-    code += "import discover.report.loop.report, discover.report.mathtext as m, sys; "
+    code += "import discover.report.loop, discover.report.mathtext as m, sys; "
     code += "assert '<svg' in m.formula('x^2', 'a'); print(matplotlib.get_backend()); "
     code += "print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -8,22 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from discover.dataset.importing import folder_files, quantities
 from discover.dataset.importing.files import blocks_of_importer
-from discover.dataset.importing.folder_files import (
-    files_of,
-    left_out,
-    nothing,
-    unread_columns,
-)
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName
 from discover.dataset.importing.names import alternatives
 from discover.dataset.importing.oscillations import waves_of
-from discover.dataset.importing.quantities import (
-    UnsaidUnits,
-    require_units,
-    units_taken_as_si,
-)
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
@@ -77,7 +67,7 @@ class _Found:
     seen: dict[tuple[str, str], None] = field(default_factory=dict)  # quantities and columns
     named: set[str] = field(default_factory=set)  # quantities that some block names
     asked_for: set[str] = field(default_factory=set)  # those that a test needs
-    units: UnsaidUnits = field(default_factory=list)
+    units: quantities.UnsaidUnits = field(default_factory=list)
     columns: list[tuple[str, str]] = field(default_factory=list)  # columns not read, and the file
 
     def note(self, readings: Readings, made: Record) -> None:
@@ -113,7 +103,8 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
     for path in paths:
         try:
             one = _read(path, mapping)
-            sources.append(_source(path))
+            digest = hashlib.sha256(read_bytes(path, path.name)).hexdigest()
+            sources.append(Source(file=str(path), sha256=digest))
         except InputError as error:
             if len(paths) == 1:
                 raise
@@ -145,18 +136,21 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
             f"{unused[0]}. Known are {', '.join(sorted(all_.named))}; name another with "
             f'--column {unused[0]}="its name", or leave the unit out.'
         )
-    require_units(all_.units)
+    quantities.require_units(all_.units)
     idle = (
         f"warning: --unit {key} changes nothing: no test that was read needs {key}."
         for key in sorted(of_units - all_.asked_for - _WAVES)
     )
-    files, notes = files_of(all_.records)
+    files, notes = folder_files.files_of(all_.records)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
     same = {key: of[0] for key, of in names.items() if len(of) == 1}
     tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
-    units, unread = units_taken_as_si(all_.units), unread_columns(all_.columns)
+    units, unread = (
+        quantities.units_taken_as_si(all_.units),
+        folder_files.unread_columns(all_.columns),
+    )
     said = [*units, *idle, *all_.said, *unread, *notes]
     return ImportedFolder(files, mapping.model_copy(update=used), said, all_.unread)
 
@@ -205,7 +199,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             why = made.notes[0] if none else _not_at(made, readings, one, mapping, chosen)
             if none or why:
                 reasons += [f"block {number} is {why}"] if why else []
-                found.said.append(left_out(where, block, why))
+                found.said.append(folder_files.left_out(where, block, why))
             else:
                 made.name = name
                 found.records.append(made)
@@ -229,7 +223,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
     if unread := [shown(name) for name in there if name not in read]:
         found.columns.append((", ".join(unread), file))
     if not found.records:
-        raise InputError(" ".join(found.unread) or nothing(path, tables, reasons))
+        raise InputError(" ".join(found.unread) or folder_files.nothing(path, tables, reasons))
     return found
 
 
@@ -311,8 +305,3 @@ def _is_part(key: str, made: Record) -> bool:
     if key == "strain":
         return "strain" in made.table or "step_strain" in made.conditions
     return key in made.table or key in _THROUGH | {INSTRUMENT.get(name) for name in made.table}
-
-
-def _source(path: Path) -> Source:
-    digest = hashlib.sha256(read_bytes(path, path.name)).hexdigest()
-    return Source(file=str(path), sha256=digest)

@@ -81,7 +81,7 @@ def _text(cell: object) -> str:
 # second column of ``.shear`` and ``.uext`` by the rate to show a viscosity, so it is a stress even
 # where it is headed "h" or "Pa-s"   [Boudara, Read & Ramírez 2020, J. Rheol. 64, 709].
 
-_TIME, _RATE, _STRESS = ("time", "s"), ("gdot", "1/s"), ("stress", "Pa")
+_TIME, _STRESS = ("time", "s"), ("stress", "Pa")
 _MODULI = (("omega", "rad/s"), ("G'", "Pa"), ("G''", "Pa"))
 
 # names and units of the columns, by suffix; further ones are read by their own names

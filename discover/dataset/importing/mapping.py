@@ -8,19 +8,12 @@ from pydantic import AfterValidator, Field, model_validator
 
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.tables.table import read_toml, toml_string
-from discover.validation import Section, validated
-from discover.words import unknown_name
+from discover.validation import Section, one_of, validated
 
 MAPPING_FILE = "import.toml"
 
 
-def _known_quantity(name: str) -> str:
-    if name not in QUANTITIES:
-        raise ValueError(unknown_name("quantity", name, QUANTITIES))
-    return name
-
-
-QuantityName = Annotated[str, AfterValidator(_known_quantity)]
+QuantityName = Annotated[str, AfterValidator(one_of("quantity", lambda: QUANTITIES))]
 
 TestName = Literal[
     "frequency_sweep", "amplitude_sweep", "flow_curve", "relaxation", "creep", "run", "none"

@@ -25,16 +25,13 @@ def thin(
     shear_rate: Float[np.ndarray, " n"],
     shear_stress: Float[np.ndarray, " n"],
 ) -> tuple[Bool[np.ndarray, " n"], str]:
-    """Return which samples to keep, and a word on what was kept.
+    """Return which samples of more than `MOST_SAMPLES` to keep, and a word on what was kept.
 
     Kept are samples evenly spaced in log time, since a start-up has its information per decade, and
     in time, since an oscillation has it per cycle; the ends; and the extremes of stress and rate.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
-    if n <= MOST_SAMPLES:
-        keep[:] = True
-        return keep, f"kept all {n:,} samples"
     keep[[0, -1]] = True
     half = (MOST_SAMPLES - 6) // 2
     positive = time[time > 0]

@@ -54,12 +54,11 @@ def header_lines(equation: Equation) -> list[str]:
     """Return origin, notes and tested box as plain lines that no file format takes amiss."""
     lines = [equation.title, *equation.notes]
     lines += [] if equation.tested is None else equation.tested.lines
-    return [plain_line(line) for line in lines if line]
-
-
-def plain_line(text: str) -> str:
-    """Return one line of text without anything that could end a comment or a string."""
-    text = " ".join(text.split())
-    return "".join(c if c.isprintable() and c not in "\"\\'`" else "_" for c in text).replace(
-        "*/", "* /"
-    )[:300]
+    whole = (" ".join(line.split()) for line in lines if line)
+    # without anything that could end a comment or a string
+    return [
+        "".join(c if c.isprintable() and c not in "\"\\'`" else "_" for c in line).replace(
+            "*/", "* /"
+        )[:300]
+        for line in whole
+    ]

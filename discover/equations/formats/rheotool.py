@@ -80,8 +80,7 @@ OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mapping
 def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoToolModel:
     """Return the law in rheoTool's words; ``sigma`` and ``gammadot`` change time and modulus.
 
-    `tolerance`: relative deviation from a form of rheoTool's that is passed over. Raises InputError
-    if rheoTool has no such law, naming the term in the way.
+    Raises InputError if rheoTool has no such law, naming the term in the way.
     """
     if equation.named is not None:
         below = equation.named.built().as_terms()
@@ -140,10 +139,7 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
 def rheotool_text(
     equation: Equation, density_kg_m3: float = DENSITY, tolerance: float = TOLERANCE
 ) -> str:
-    """Return the file ``constant/constitutiveProperties``.
-
-    `density_kg_m3`: rheoTool's solvers want a density; shear rheometry does not measure it.
-    """
+    """Return the file ``constant/constitutiveProperties``."""
     if equation.states:
         raise InputError(
             f"{', '.join(part.effect for part in equation.states)}: cannot be exported to "

@@ -183,8 +183,8 @@ class InUnitsNotation(MathmlNotation):
         return f"{self.time}{_TENSORS[name]}" if name == "gammadot" else _TENSORS[name]
 
 
+# Of a summand that begins an element of its own, where it would be spaced as a prefix
 _SIGN = "<mo form='infix'>{}</mo>"
-"""Of a summand that begins an element of its own, where it would be spaced as a prefix."""
 
 
 def law_element(

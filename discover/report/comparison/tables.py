@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from discover.comparison.comparison import Comparison
-from discover.comparison.outcome import LearnerOutcome
+from discover import words
+from discover.comparison import Comparison, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
 from discover.equations.spelling.markup import law_element, term_element, term_mathml
@@ -16,20 +17,12 @@ from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
+    known,
     learner_as_subject,
     percent,
     sentence,
     terms_text,
     worst,
-)
-from discover.words import (
-    FIGURE_SYMBOLS,
-    effects_title,
-    interval,
-    listed,
-    percent_of,
-    readable,
-    significant,
 )
 
 
@@ -54,7 +47,7 @@ def selection(comparison: Comparison) -> dict[str, Any] | None:
         }
         for row in path
     ]
-    spelled = titles(comparison)
+    spelled = _titles(comparison)
     runs = [
         {"title": spelled.get(name, name), "errors": [_by_run(row).get(name) for row in path]}
         for name in _by_run(path[0])
@@ -71,18 +64,19 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for flow in comparison.judged:
         band = comparison.claimed(flow)
-        widths = {} if band is None else band.half_widths()
+        of_posterior = {} if band is None else band.half_widths()
         cells = []
         for who in ("before", *comparison.outcomes):
             if who == "tensor_sindy":
-                mine = widths if comparison.determined_terms else {}
+                widths = of_posterior if comparison.determined_terms else {}
             else:
-                mine = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+                widths = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+            finite = {name: width for name, width in widths.items() if known(width)}
             law = comparison.before if who == "before" else comparison.outcomes[who].predictions
             cells += [
                 {
                     "value": value,
-                    "half_width": None if value is None else known_or_none(mine.get(name)),
+                    "half_width": None if value is None else finite.get(name),
                     "runs_away": law[flow.key] is None and name in flow.reference,
                 }
                 for name, value in comparison.errors(who, flow).items()
@@ -98,33 +92,79 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-def known_or_none(width: float | None) -> float | None:
-    """Return a width; None where it is not finite."""
-    return None if width is None or not np.isfinite(width) else width
+def laws_fitted(comparison: Comparison) -> dict[str, Any]:
+    """Return every law fitted to the runs, classical and learned: constants, misfit, errors.
 
-
-def network_interval(comparison: Comparison) -> bool:
-    """Return whether the terms of the network have intervals; True without a network."""
-    network = comparison.outcomes.get("tbnn_ude")
-    return network is None or any(term.ci95 for term in network.terms)
-
-
-def explanation_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the sets of effects and terms that the runs allow, the likeliest first."""
-    return [
+    Errors are means, of the recorded stress, over the flows that no fit saw, those inside the
+    fitted range apart from those beyond it, and whether there are such.
+    """
+    placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
+    rows = [
         {
-            "effects": effects_title(one.effects) or "the known part alone",
+            "law": fit.title,
             "constants": ", ".join(
-                f"{readable(name)} = {significant(value, 3)}"
-                for own in one.parameters.values()
-                for name, value in own.items()
+                f"{words.readable(name)} = {words.estimate(value, ends)} ({words.interval(ends)})"
+                for name, value in fit.parameters.items()
+                for ends in [fit.ci95[name]]
             ),
-            "probability": one.probability,
-            "fit": one.error.fit,
-            "held_out": one.error.held_out,
+            "number": len(fit.parameters),
+            "misfit": fit.misfit,
+            "criterion": fit.criterion,
+            **_mean_errors(fit.errors, placed),
         }
-        for one in comparison.posterior.explanations.likeliest_first
+        for fit in comparison.classical
     ]
+    for name, outcome in comparison.outcomes.items():
+        errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
+        left = comparison.lack_of_fit.get(name)
+        number = outcome.details.get("n_constants")  # None of a learner that does not say
+        if outcome.learner == "tensor_sindy":
+            number = sum(1 + len(term.inner) for term in outcome.terms)
+        rows.append(
+            {
+                "law": learner_title(name),
+                "constants": "",
+                "number": number,
+                "misfit": None if left is None else left.misfit,
+                "criterion": None,
+                **_mean_errors(errors, placed),
+            }
+        )
+    judged = placed.values()
+    return {"rows": rows, "inside": True in judged, "beyond": False in judged}
+
+
+def _mean_errors(
+    errors: Mapping[str, Mapping[str, float | None]], inside: Mapping[str, bool]
+) -> dict[str, float | None]:
+    """Return the mean error of the recorded stress inside the fitted range and beyond it."""
+    means: dict[str, float | None] = {}
+    for name, wanted in (("inside", True), ("beyond", False)):
+        flows = [flow for flow, is_inside in inside.items() if is_inside is wanted]
+        # what is recorded comes first
+        values = [next(iter(errors[flow].values())) for flow in flows]
+        said = [value for value in values if value is not None]
+        # a law that cannot be integrated through one of the flows has no mean
+        means[name] = float(np.mean(said)) if said and len(said) == len(values) else None
+    return means
+
+
+STANDING = {
+    "explained": "",
+    "unexplained": "None of these laws describes the data to the noise. They are the best "
+    "descriptions in their class.",
+    "no_signal": "The data hold no signal, so no law is reported.",
+}
+CONDITION = {
+    True: "The intervals hold if the law is in the library, with small instrument errors "
+    "fitted jointly.",
+    False: "The intervals hold for this law alone, which is not the likeliest.",
+}
+NO_TERM = {
+    "explained": "No term: the known part alone explains the data.",
+    "unexplained": "No term.",
+    "no_signal": "No term is reported: the data hold no signal.",
+}
 
 
 def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> dict[str, Any]:
@@ -145,119 +185,51 @@ def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> di
     }
 
 
-def learner_columns(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the title of each learner, and whether its terms have intervals."""
-    return [
-        {"title": learner_title(name), "intervals": any(term.ci95 for term in outcome.terms)}
-        for name, outcome in comparison.outcomes.items()
-    ]
+def has_intervals(outcome: LearnerOutcome) -> bool:
+    """Return whether terms have intervals: those of a network alone have none."""
+    return any(term.ci95 for term in outcome.terms)
 
 
 def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the terms that were found, or should have been, learner by learner."""
+    """Return the terms that were found, or should have been, with those of each learner."""
     truth = {t.term: t for t in comparison.truth or ()}
-    found: dict[str, dict[str, RecoveredTerm]] = {}
-    for name, outcome in comparison.outcomes.items():
-        for term in outcome.terms:
-            found.setdefault(term.term, {})[name] = term
+    found = {n: {t.term: t for t in one.terms} for n, one in comparison.outcomes.items()}
     rows = []
-    for name in dict.fromkeys([*truth, *found]):
-        cells, inner = [], []
-        if name in truth and truth[name].inner:
-            inner += [
-                f"truth: {readable(key)} = {significant(value)}"
-                for key, value in truth[name].inner.items()
-            ]
-        for learner, outcome in comparison.outcomes.items():
-            term = found.get(name, {}).get(learner)
-            cells.append(
-                {
-                    "debiased": None if term is None else term.coefficient,
-                    "penalised": None if term is None else term.coefficient_penalised,
-                    "ci95": None if term is None else term.ci95,
-                    "intervals": any(t.ci95 for t in outcome.terms),
-                }
-            )
-            if term is not None:
-                inner += [
-                    f"{learner_title(learner)}: {readable(key)} = {significant(value)}"
-                    + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
-                    for key, value in term.inner.items()
-                ]
-                inner += [
-                    f"{learner_title(learner)}, if the coefficient is one: {readable(key)} = "
-                    f"{significant(value)} ({interval((low, high))})"
-                    for key, (value, low, high) in term.inner_at_one.items()
-                ]
-        true = truth.get(name)
-        rows.append(
-            {
-                "math": term_element(name),
-                "inner": ", ".join(inner),
-                "truth": (0.0 if true is None else true.coefficient),
-                "cells": cells,
-            }
-        )
+    for name in dict.fromkeys(chain(truth, *found.values())):
+        true, own = truth.get(name), {learner: terms.get(name) for learner, terms in found.items()}
+        inner = [] if true is None else [f"truth: {_equals(*one)}" for one in true.inner.items()]
+        for learner, term in own.items():
+            inner += [] if term is None else _inner(learner_title(learner), term)
+        size = 0.0 if true is None else true.coefficient
+        rows.append({"term": name, "inner": ", ".join(inner), "truth": size, "found": own})
     return rows
 
 
-def coefficients(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the network's coefficients along the training runs."""
-    network = comparison.outcomes.get("tbnn_ude")
-    table = {} if network is None else network.details.get("coefficients", {})
-    return [
-        {"math": term_element(name), "mean": row["mean"], "spread": row["spread"]}
-        for name, row in table.items()
+def _inner(who: str, term: RecoveredTerm) -> Iterator[str]:
+    for key, value in term.inner.items():
+        ends = f" ({words.interval(term.inner_ci95[key])})" if key in term.inner_ci95 else ""
+        yield f"{who}: {_equals(key, value)}{ends}"
+    for key, (value, *ends) in term.inner_at_one.items():
+        yield f"{who}, if the coefficient is one: {_equals(key, value)} ({words.interval(ends)})"
+
+
+def _equals(name: str, value: float) -> str:
+    return f"{words.readable(name)} = {words.significant(value)}"
+
+
+def physics_checks(comparison: Comparison) -> dict[str, list[Mapping[str, Any] | None]]:
+    """Return what every law says to each check, by its name; None where it was not made."""
+    reports = [
+        {check["name"]: check for check in (report or {"checks": ()})["checks"]}
+        for report in comparison.physics.values()
     ]
+    names = dict.fromkeys(chain(*reports))
+    return {name: [own.get(name) for own in reports] for name in names}
 
 
-def next_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the tests that could be run, the most telling first."""
-    return [
-        {
-            "title": test.title,
-            "observed": FIGURE_SYMBOLS.get(test.quantity, test.quantity),
-            "nats": test.nats,
-        }
-        for test in comparison.posterior.next_tests.tests[:_MOST_TESTS]
-    ]
-
-
-_MOST_TESTS = 6
-
-
-def titles(comparison: Comparison) -> dict[str, str]:
+def _titles(comparison: Comparison) -> dict[str, str]:
     """Return the flows in the field's notation, by their names."""
     return {flow.name: flow.title for flow in comparison.flows}
-
-
-def structure(comparison: Comparison) -> dict[str, Any] | None:
-    """Return what the training flows could tell of the library; None where not looked at."""
-    if comparison.structure is None:
-        return None
-    relations = [readable(relation.text) for relation in comparison.structure.relations]
-    return {"text": comparison.structure.text, "relations": relations}
-
-
-_MARKS = {True: "✓", False: "✗", None: "–"}
-
-
-def physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return one row for each check, with what every law says to it."""
-    reports = [report or {"checks": []} for report in comparison.physics.values()]
-    names = dict.fromkeys(check["name"] for report in reports for check in report["checks"])
-    rows = []
-    for name in names:
-        cells = []
-        for report in reports:
-            check = next((c for c in report["checks"] if c["name"] == name), None)
-            cells.append(
-                {"mark": _MARKS[None], "text": ""}
-                if check is None
-                else {"mark": _MARKS[check["passed"]], "text": check["text"]}
-            )
-        rows.append({"name": name, "cells": cells})
-    return rows
 
 
 _LAW_SPELLED = re.compile(r"^h = .*? (?=(?:leaves|gives|predicts) )")
@@ -270,7 +242,7 @@ def _sign(value: float, first: bool) -> str:
     return f'<mo form="{form}">{"−" if value < 0 else "+"}</mo>'
 
 
-def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
+def rival_row(rival: Rival, comparison: Comparison) -> dict[str, Any]:
     """Return a law that the data do not tell from the one found."""
     # one element a term, so that a long law breaks between them
     terms = [
@@ -278,24 +250,21 @@ def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
         "</mrow></math>"
         for i, (name, value) in enumerate(rival.law.coefficients.items())
     ]
-    place = rival.separated_by
+    place, titles = rival.separated_by, _titles(comparison)
     return {
         "math": " ".join(terms),
         # it stands above the sentence
         "reason": _LAW_SPELLED.sub("It ", rival.reason),
         "errors": rival.errors_to_chosen,
-        "separated": f"{FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
+        "separated": f"{words.FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
         f"{titles.get(place['protocol'], place['protocol'])}"
         if place
         else "nothing that was tried",
     }
 
 
-_MOST_TERMS = 4
-"""More are a table and no sentence."""
-
-_DIFFERS = 0.05
-"""Relative difference between network and posterior that is told."""
+_MOST_TERMS = 4  # More are a table and no sentence
+_DIFFERS = 0.05  # Relative difference between network and posterior that is told
 
 
 def learner_lines(comparison: Comparison) -> list[str]:
@@ -313,11 +282,11 @@ def _parts(comparison: Comparison, name: str, outcome: LearnerOutcome) -> Iterat
     yield from _unseen(comparison, name)
     apart = {q: off for q, off in comparison.disagreement.items() if off > _DIFFERS}
     if name == "tbnn_ude" and apart:
-        told = [f"{readable(q)} by {percent_of(off)}" for q, off in apart.items()]
-        yield f"it differs from the posterior in {listed(told)}"
+        told = [f"{words.readable(q)} by {words.percent_of(off)}" for q, off in apart.items()]
+        yield f"it differs from the posterior in {words.listed(told)}"
     checks = (comparison.physics.get(name) or {}).get("checks", ())
     if failed := [check["name"] for check in checks if check["passed"] is False]:
-        yield f"it fails {listed(failed)}"
+        yield f"it fails {words.listed(failed)}"
 
 
 def _of_learner(comparison: Comparison, name: str, outcome: LearnerOutcome) -> str:
@@ -330,7 +299,7 @@ def _of_learner(comparison: Comparison, name: str, outcome: LearnerOutcome) -> s
         if not outcome.terms:
             return f"{who} projects on no term{missed}"
         largest = max(outcome.terms, key=lambda term: abs(term.coefficient))
-        coefficient = f"{significant(largest.coefficient)} {readable(largest.term)}"
+        coefficient = f"{words.significant(largest.coefficient)} {words.readable(largest.term)}"
         return f"{who} projects mostly on {coefficient}{missed}"
     share = comparison.shares.get(name, 0.0)
     chance = f" (probability {percent(share)})" if share else ""
@@ -351,10 +320,10 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
             if (value := worst(errors, quantity)) is not None
         ]
         if said:
-            parts.append(f"{listed(said)} {where}")
+            parts.append(f"{words.listed(said)} {where}")
     told = []
     if parts:
         told.append(f"{learner_as_subject(name)} misses unseen flows: {'; '.join(parts)}")
     if lost:
-        told.append(f"{learner_as_subject(name)} diverges in {listed(lost)}")
+        told.append(f"{learner_as_subject(name)} diverges in {words.listed(lost)}")
     return told

@@ -80,8 +80,7 @@ _LEARNER_STYLES: dict[str, dict[str, Any]] = {
     "tensor_sindy": {"color": SPARSE, "linestyle": "--", "linewidth": 1.8},
     "tbnn_ude": {"color": NETWORK, "linestyle": ":", "linewidth": 2.2},
 }
-_OTHERS = (PURPLE, YELLOW, GREEN)
-"""Colours of learners of users' own, in their order."""
+_OTHERS = (PURPLE, YELLOW, GREEN)  # Colours of learners of users' own, in their order
 
 CHOSEN_STYLE: dict[str, Any] = {"color": SPARSE, "linestyle": "-"}
 RIVAL_STYLES: tuple[dict[str, Any], ...] = (
@@ -165,7 +164,8 @@ class Picture:
         text = text.replace("url(#", f"url(#{prefix}-").replace('href="#', f'href="#{prefix}-')
         text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
         # the page decides the width
-        text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", _without_height(text), count=1)
+        for size in ("height", "width"):
+            text = re.sub(rf'(<svg[^>]*?) {size}="[^"]*"', r"\1", text, count=1)
         description = html.escape(self.caption or self.name, quote=True)
         told = f'role="img" aria-label="{description}"'
         if self.axes:
@@ -189,10 +189,6 @@ class Picture:
         return text
 
 
-def _without_height(text: str) -> str:
-    return re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
-
-
 @contextmanager
 def only_settings(settings: Mapping[str, Any]) -> Iterator[None]:
     """Draw with these settings and matplotlib's defaults, whatever the session or a file asked for.
@@ -211,8 +207,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
 
     The figure is not pyplot's: a notebook that writes a report keeps its own pictures and backend.
 
-    `rows`, `columns`: number of panels. `width`, `height`: of the whole figure and of one row, in
-    inches.
+    `width`, `height`: of the whole figure and of one row, in inches.
     """
     with only_settings(_SETTINGS):
         drawing = Figure(figsize=(width, height * rows), layout="constrained")
@@ -223,10 +218,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
 def panels_of(
     count: int, columns: int = 4, width: float = 9.0, height: float = 2.6
 ) -> Iterator[tuple]:
-    """Yield a figure, its axes, and as many panels as are asked for; those left over are hidden.
-
-    `count`, `columns`: number of panels, and how many stand side by side at most.
-    """
+    """Yield a figure, its axes, and `count` panels, so many side by side; the rest are hidden."""
     columns = min(columns, count)
     with figure(-(-count // columns), columns, width, height) as (drawing, axes):
         for panel in axes.ravel()[count:]:
@@ -346,10 +338,8 @@ def runs_through_decades(
 ) -> bool:
     """Whether logarithmic time is the natural axis: decades of it, at one rate or sampled so.
 
-    A rate that was measured rises before it is constant; samples that crowd at early times say the
-    same.
-
-    `times`, `shear_rate`: of one run, in s and 1/s.
+    A rate in 1/s that was measured rises before it is constant; samples that crowd at early times,
+    in s, say the same.
     """
     positive = times[times > 0]
     if not positive.size or positive[-1] <= _DECADES * positive[0]:
@@ -365,8 +355,8 @@ def make_logarithmic(axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+# Ratio of the ends of a logarithmic axis below which decades alone do not say where one is
 _FEW_DECADES = 20.0
-"""Ratio of the ends of a logarithmic axis below which decades alone do not say where one is."""
 
 
 def make_percentage(axis) -> None:
@@ -410,9 +400,6 @@ def shade_between(
 
     There a fill between the curves as a whole would shade the inside of a loop and a bar where it
     begins and ends, and not what the band sweeps.
-
-    `panel`: axes of matplotlib. `along`, `low`, `high`: where the curves stand, and the curves,
-    shape (n,). `style`: of the shade, as for `matplotlib.axes.Axes.fill_between`.
     """
     if np.all(np.diff(along) >= 0.0):
         panel.fill_between(along, low, high, **style)

@@ -9,27 +9,7 @@ from matplotlib.figure import Figure
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
-from discover.report.plots.style import (
-    BEFORE_STYLE,
-    INK,
-    MEASURED,
-    SHADE,
-    SPARSE,
-    TRUTH_STYLE,
-    Picture,
-    about_middle,
-    figure,
-    in_last_cycle,
-    label_rows,
-    learner_style,
-    legend_above,
-    literal,
-    make_logarithmic,
-    panels_of,
-    picture,
-    runs_through_decades,
-    shade_between,
-)
+from discover.report.plots import style as look
 from discover.words import FIGURE_SYMBOLS, listed
 
 START_UP_SHOWN = 10.0
@@ -52,25 +32,32 @@ def curves(comparison: Comparison, flow: Flow):
     """Yield label, style and stresses of everything known in a flow, in drawing order."""
     before = comparison.before[flow.key]
     if before is not None:
-        yield "before (known part alone)", BEFORE_STYLE, before
+        yield "before (known part alone)", look.BEFORE_STYLE, before
     if flow.reference:
         label = "truth" if flow.is_truth else "measured"
-        style = TRUTH_STYLE if flow.is_truth else {"color": MEASURED, "marker": ".", "ls": "none"}
+        style = (
+            look.TRUTH_STYLE
+            if flow.is_truth
+            else {"color": look.MEASURED, "marker": ".", "ls": "none"}
+        )
         yield label, style, flow.reference
     for name, outcome in comparison.outcomes.items():
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
-            yield learner_title(name), learner_style(name), prediction
+            yield learner_title(name), look.learner_style(name), prediction
 
 
-def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
+def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
     last = last_cycle(flow)
-    strain = about_middle(flow.strain, last)[last]
+    strain = look.about_middle(flow.strain, last)[last]
     closed = {"elastic": (strain, "strain γ"), "viscous": (flow.rate[last], rate_label)}
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
-    with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
+    seen = "no learner saw this flow."
+    if flow.name in {one.name for one in comparison.flows_of("training")}:
+        seen = "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
+    with look.figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
             for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
@@ -78,7 +65,9 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
                     for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
                         panel.plot(along, stresses[quantity][last], **style)
             _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
-            _mark_training(row[0], flow)
+            if flow.training_end is not None and flow.training_end < flow.times[-1]:
+                span = flow.times[0], flow.training_end
+                row[0].axvspan(*span, color=look.SHADE, lw=0, label="training times", zorder=0)
             _mark_open(row[0], comparison, flow, quantity)
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
             for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
@@ -86,15 +75,15 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
                 _frame(panel, comparison, flow, quantity, last)
             row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
         axes[-1, 0].set_xlabel(time_label)
-        axes[0, 0].set_title(literal(flow.title))
+        axes[0, 0].set_title(look.literal(flow.title))
         for column, (kind, (_, label)) in enumerate(closed.items(), 1):
             axes[0, column].set_title(f"{kind} Lissajous curve, last cycle")
             axes[-1, column].set_xlabel(label)
-        legend_above(drawing, axes)
-        return picture(
+        look.legend_above(drawing, axes)
+        return look.picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_seen(comparison, flow)} "
+            f"{flow.title}: {seen} "
             "Left, stresses against time; beyond the times shaded grey the prediction runs past "
             "the length of the training series. Middle and right, the last cycle against strain "
             "and against shear rate. Shaded in orange is the 95 % band of all laws "
@@ -103,11 +92,14 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
         )
 
 
-def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
+def start_up_picture(comparison: Comparison, flow: Flow) -> look.Picture:
     """Return σ12, N1 and N2 in start-up, or else what was recorded, such as the strain of creep."""
     stress_unit, _, _ = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
-    with figure(1, len(quantities), height=2.9) as (drawing, axes):
+    seen = "no learner saw this flow."
+    if all(one.oscillatory for one in comparison.flows_of("training")):
+        seen = "a kind of flow that training, all oscillatory, did not contain."
+    with look.figure(1, len(quantities), height=2.9) as (drawing, axes):
         shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
         if not flow.is_truth:
             shown = np.ones_like(shown)
@@ -122,21 +114,21 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
             panel.set_ylabel(FIGURE_SYMBOLS[drawn] + ("" if flow.records_strain else stress_unit))
             panel.set_xlabel(_axis_of(comparison, flow))
             _set_scales(panel, flow, quantity)
-        legend_above(drawing, axes)
-        return picture(
+        look.legend_above(drawing, axes)
+        return look.picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}.",
+            f"{flow.title}: {seen} It lies {comparison.placement(flow).text}.",
         )
 
 
-def training_picture(comparison: Comparison) -> Picture:
+def training_picture(comparison: Comparison) -> look.Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
     kinds = {flow.protocol.quantity for flow in flows}
     recorded = listed([symbol for kind, symbol in FIGURE_SYMBOLS.items() if kind in kinds])
     with drawn_records(comparison, flows) as drawing:
-        return picture(
+        return look.picture(
             drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
         )
 
@@ -145,20 +137,20 @@ def training_picture(comparison: Comparison) -> Picture:
 def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Figure]:
     """Yield a figure with a panel for each flow: what was recorded of it, and every learner."""
     stress_unit, _, _ = units(comparison)
-    with panels_of(len(flows), height=1.8) as (drawing, axes, panels):
+    with look.panels_of(len(flows), height=1.8) as (drawing, axes, panels):
         for panel, flow in zip(panels, flows, strict=True):
             recorded = flow.measured
             if recorded is None and flow.kind != "training" and flow.is_record:
                 recorded = flow.reference.get("sigma12")
             if recorded is not None:
-                panel.plot(flow.along, recorded, ".", color=MEASURED, ms=2.5, label="data")
+                panel.plot(flow.along, recorded, ".", color=look.MEASURED, ms=2.5, label="data")
             for name, outcome in comparison.outcomes.items():
                 prediction = outcome.predictions[flow.key]
                 if prediction is not None:
-                    style = {**learner_style(name), "label": learner_title(name)}
+                    style = {**look.learner_style(name), "label": learner_title(name)}
                     panel.plot(flow.along, prediction["sigma12"], **style)
             _draw_band(panel, comparison, flow, "sigma12", slice(None))
-            panel.set_title(literal(flow.title), fontsize=8)
+            panel.set_title(look.literal(flow.title), fontsize=8)
             _set_scales(panel, flow, "sigma12", truth_too=True)
             if flow.is_of_states:
                 panel.set_xlabel(_axis_of(comparison, flow))
@@ -166,22 +158,9 @@ def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Fig
             panel.set_xlabel(_axis_of(comparison, flow))
         units_of = ["" if flow.records_strain else stress_unit for flow in flows]
         symbols = [FIGURE_SYMBOLS[flow.protocol.quantity] for flow in flows]
-        label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units_of, strict=True)])
-        legend_above(drawing, axes)
+        look.label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units_of, strict=True)])
+        look.legend_above(drawing, axes)
         yield drawing
-
-
-def _seen(comparison: Comparison, flow: Flow) -> str:
-    if flow.name in {f.name for f in comparison.flows_of("training")}:
-        return "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
-    return "no learner saw this flow."
-
-
-def _new_kind(comparison: Comparison) -> str:
-    """Return how a start-up differs from the flows fitted."""
-    if all(flow.oscillatory for flow in comparison.flows_of("training")):
-        return "a kind of flow that training, all oscillatory, did not contain."
-    return "no learner saw this flow."
 
 
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
@@ -195,12 +174,12 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
     members = None if network is None else network.bands.get(flow.key)
     if members is not None:
         label = "networks that fit as well"
-        limits.append((*members[quantity], learner_style("tbnn_ude")["color"], label))
+        limits.append((*members[quantity], look.learner_style("tbnn_ude")["color"], label))
     band = comparison.claimed(flow)
     if band is not None and np.any(np.isfinite(band.low[quantity])):
-        limits.append((band.low[quantity], band.high[quantity], SPARSE, "95 % band"))
+        limits.append((band.low[quantity], band.high[quantity], look.SPARSE, "95 % band"))
     for low, high, colour, label in limits:
-        shade_between(
+        look.shade_between(
             panel, along, low[shown], high[shown],
             color=colour, alpha=0.18, linewidth=0, label=label,
         )  # fmt: skip
@@ -225,8 +204,8 @@ def _set_scales(panel, flow: Flow, quantity: str, truth_too: bool = False) -> No
     in_time = not flow.is_of_states and (truth_too or not flow.is_truth)
     # in creep the stress is constant, and not the rate
     pace = np.ones_like(flow.times) if flow.records_strain else flow.rate
-    if flow.is_of_states or (in_time and runs_through_decades(flow.times, pace)):
-        make_logarithmic(panel.xaxis)
+    if flow.is_of_states or (in_time and look.runs_through_decades(flow.times, pace)):
+        look.make_logarithmic(panel.xaxis)
 
 
 def _in_decades(flow: Flow, quantity: str) -> bool:
@@ -236,19 +215,12 @@ def _in_decades(flow: Flow, quantity: str) -> bool:
     return strain is not None and bool(np.min(strain) > 0.0) and np.ptp(np.log(strain)) > _DECADES
 
 
-def _mark_training(panel, flow: Flow) -> None:
-    if flow.training_end is not None and flow.training_end < flow.times[-1]:
-        panel.axvspan(
-            flow.times[0], flow.training_end, color=SHADE, lw=0, label="training times", zorder=0
-        )
-
-
 def _mark_open(panel, comparison: Comparison, flow: Flow, quantity: str) -> None:
     """Say in a panel that these data leave the quantity open, so that no missing band is narrow."""
     if any(statement.leaves_open(quantity, flow) for statement in comparison.statements):
         panel.annotate(
             "not determined by these data", (0.98, 0.97), xycoords="axes fraction",
-            ha="right", va="top", fontsize=7, color=INK,
+            ha="right", va="top", fontsize=7, color=look.INK,
         )  # fmt: skip
 
 
@@ -277,11 +249,11 @@ def last_cycle(flow: Flow) -> np.ndarray:
     frequencies = np.asarray(flow.protocol.frequencies)
     active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
     if active.size and np.min(active) > 0:
-        return in_last_cycle(flow.times, float(np.min(active)))
+        return look.in_last_cycle(flow.times, float(np.min(active)))
     # of a rate that was measured, from where the strain last crossed its middle in this sense
     strain = flow.strain - 0.5 * (np.max(flow.strain) + np.min(flow.strain))
     turns = np.flatnonzero((strain[1:] > 0.0) & (strain[:-1] <= 0.0))
     if turns.size < 2:
         return np.ones(flow.times.size, dtype=bool)
     period = float(np.median(np.diff(flow.times[turns])))
-    return in_last_cycle(flow.times, 2.0 * np.pi / period)
+    return look.in_last_cycle(flow.times, 2.0 * np.pi / period)

@@ -7,53 +7,32 @@ import numpy as np
 from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
 from discover.loop.by_quantity import FASTER
-from discover.loop.constants import ConstantByMode
-from discover.report.plots.loop.runs import (
-    FIT_COLOUR,
-    HELD_COLOUR,
-    along_in_common,
-    axis_label,
-    models_of,
-    symbol_of,
-    through_decades,
-)
-from discover.report.plots.style import (
-    BEFORE,
-    GREEN,
-    INK,
-    NETWORK,
-    SHADE,
-    Panel,
-    Picture,
-    figure,
-    legend_above,
-    literal,
-    make_logarithmic,
-    make_percentage,
-    picture,
-    row_of_panels,
-)
+from discover.loop.parts import ConstantByMode
+from discover.report.plots import style as look
+from discover.report.plots.loop import runs
 from discover.report.wording import percent
 from discover.words import effect_title, listed, readable, significant
 
 
-def residual_picture(result: LoopResult) -> Picture:
+def residual_picture(result: LoopResult) -> look.Picture:
     """Return the residual against time and strain, before and after."""
     records = [record for record in result.records if record.is_transient]
     only_states = not records
     records = records or list(result.records)
-    start_ups = only_states or all(map(through_decades, records))
+    start_ups = only_states or all(map(runs.through_decades, records))
     labels = (
-        (along_in_common(records), axis_label(records)) if only_states else ("time (s)", "strain")
+        (runs.along_in_common(records), runs.axis_label(records))
+        if only_states
+        else ("time (s)", "strain")
     )
-    models = models_of(records)
-    with figure(len(models), 2, height=2.4) as (drawing, axes):
+    models = runs.models_of(records)
+    with look.figure(len(models), 2, height=2.4) as (drawing, axes):
         for row, (stage, title) in enumerate(models):
             limit = 0.0
             for place, record in enumerate(records):
                 relative = 100.0 * record.relative_residual[stage]
                 style = {
-                    "color": HELD_COLOUR if record.held_out else FIT_COLOUR,
+                    "color": runs.HELD_COLOUR if record.held_out else runs.FIT_COLOUR,
                     "lw": 0.9,
                     "alpha": 0.8,
                     "label": "held out" if record.held_out else "fitted",
@@ -67,14 +46,14 @@ def residual_picture(result: LoopResult) -> Picture:
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             for panel, label in zip(axes[row], labels, strict=True):
                 if start_ups:
-                    make_logarithmic(panel.xaxis)
+                    look.make_logarithmic(panel.xaxis)
                 panel.set_xlabel(label if row == len(models) - 1 else "")
-                panel.axhline(0.0, color=INK, lw=0.6)
+                panel.axhline(0.0, color=look.INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
-            axes[row, 0].set_ylabel(f"residual (% of rms {symbol_of(records)})")
+            axes[row, 0].set_ylabel(f"residual (% of rms {runs.symbol_of(records)})")
             axes[row, 0].set_title(title, loc="left")
-        legend_above(drawing, axes)
-        return picture(
+        look.legend_above(drawing, axes)
+        return look.picture(
             drawing,
             "residual",
             "Prediction minus measurement, over each run's root-mean-square stress, against "
@@ -86,33 +65,35 @@ def residual_picture(result: LoopResult) -> Picture:
         )
 
 
-def waterfall_picture(result: LoopResult) -> Picture:
+def waterfall_picture(result: LoopResult) -> look.Picture:
     """Return the errors after each stage."""
     labels = ["your model", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     # from top to bottom and no wider than a phone shows with legible letters
-    with figure(1, 1, width=5.2, height=1.1 + 0.42 * len(labels)) as (drawing, axes):
+    with look.figure(1, 1, width=5.2, height=1.1 + 0.42 * len(labels)) as (drawing, axes):
         panel = axes[0, 0]
         positions = np.arange(len(labels))
         held_out = [p.held_out for p in pairs if p.held_out is not None]
         judged = len(held_out) == len(pairs)
-        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19 if judged else 0.0)]
+        series = [
+            ("fitted runs", runs.FIT_COLOUR, [p.fit for p in pairs], -0.19 if judged else 0.0)
+        ]
         if judged:
-            series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
+            series.append(("held-out runs", runs.HELD_COLOUR, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.barh(positions + shift, heights, 0.36, color=colour, label=label)
             panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
             _draw_ranges(panel, result, held_out=label != "fitted runs", shift=shift)
-        panel.axvline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
-        make_percentage(panel.xaxis)
+        panel.axvline(100.0 * result.noise_floor, color=look.GREEN, lw=1.2, ls="--", label="noise")
+        look.make_percentage(panel.xaxis)
         heights = [100.0 * value for _, _, values, _ in series for value in values]
         panel.set_xlim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
         panel.set_yticks(positions, labels)
         panel.set_ylim(max(len(labels), 2) - 0.4, -0.6)  # a bar alone would fill the picture
         panel.set_xlabel("relative error (%)")
-        legend_above(drawing, axes)
-        return picture(
+        look.legend_above(drawing, axes)
+        return look.picture(
             drawing,
             "waterfall",
             "Error after each effect added: root mean square of prediction minus measurement over "
@@ -141,19 +122,19 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
         return
     table = 100.0 * np.stack(errors)
     places = np.arange(table.shape[1]) + shift - 0.19  # next to the label of the bar
-    panel.hlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
+    panel.hlines(places, table.min(axis=0), table.max(axis=0), color=look.INK, lw=1.2)
 
 
 # whether a constant is left open, colour and filling of its mark, and what that is called
 _KINDS = (
-    (False, NETWORK, NETWORK, "fitted"),
-    (True, BEFORE, "none", "not determined by these data"),
+    (False, look.NETWORK, look.NETWORK, "fitted"),
+    (True, look.BEFORE, "none", "not determined by these data"),
 )
 
 
 def by_mode_picture(
     constants: Mapping[str, ConstantByMode], is_unexplained: bool
-) -> Picture | None:
+) -> look.Picture | None:
     """Return each constant by mode with its band; None where there is none.
 
     `constants`: by name of the parameter, the effect or the term. `is_unexplained`: whether a law
@@ -167,7 +148,7 @@ def by_mode_picture(
         bands = []
         if told:
             times, low, high = np.array(sorted(told)).T
-            bands = [(times, low, high, {"color": SHADE, "label": "95 % interval"})]
+            bands = [(times, low, high, {"color": look.SHADE, "label": "95 % interval"})]
         points = {"marker": "o", "ms": 5.0, "ls": "none"}
         curves = []
         for left_open, colour, fill, label in _KINDS:
@@ -175,9 +156,9 @@ def by_mode_picture(
             times = [mode.relaxation_time_s for mode in shown]
             style = {**points, "color": colour, "mfc": fill, "label": label}
             curves.append((times, [mode.value for mode in shown], style))
-        label = literal(readable(effect_title(name)))
+        label = look.literal(readable(effect_title(name)))
         settings = {"xscale": "log", "xlabel": "relaxation time (s)", "ylabel": label}
-        panels.append(Panel(curves, settings, bands))
+        panels.append(look.Panel(curves, settings, bands))
     said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
     doubt = ""
     if is_unexplained:
@@ -186,7 +167,7 @@ def by_mode_picture(
             "constants of the fluid."
         )
     caption = f"{said}{doubt} Intervals take it that the law is the fluid's."
-    return row_of_panels("by_mode", caption, panels, 9.0, 2.8)
+    return look.row_of_panels("by_mode", caption, panels, 9.0, 2.8)
 
 
 def by_mode_sentence(name: str, constant: ConstantByMode) -> str:

@@ -8,34 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from discover.loop import RunRecord
-from discover.loop.loop_result import LoopResult
+from discover.loop import LoopResult, RunRecord
 from discover.loop.reading import oscillation
 from discover.protocols.kinematics import MODULI
-from discover.report.plots.style import (
-    BEFORE,
-    CHOSEN_STYLE,
-    MEASURED,
-    NETWORK,
-    RIVAL_STYLES,
-    SHADE,
-    SPARSE,
-    TRUTH,
-    Panel,
-    Picture,
-    about_middle,
-    figure,
-    in_last_cycle,
-    label_rows,
-    legend_above,
-    literal,
-    make_logarithmic,
-    panels_of,
-    picture,
-    row_of_panels,
-    runs_through_decades,
-    shade_between,
-)
+from discover.report.plots import style as look
 from discover.report.wording import free_form_sentence, percent, recorded_symbol
 from discover.words import FIGURE_SYMBOLS, effects_title
 
@@ -43,7 +19,7 @@ Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
 
 
-FIT_COLOUR, HELD_COLOUR = NETWORK, SPARSE
+FIT_COLOUR, HELD_COLOUR = look.NETWORK, look.SPARSE
 """Of runs fitted and held out."""
 
 
@@ -56,7 +32,9 @@ THOUSANDS = 1e4
 def through_decades(record: RunRecord) -> bool:
     """Return whether a run goes through decades of time, as start-ups do."""
     at_rest = record.control == "stress"  # in creep the stress is constant, and not the rate
-    return runs_through_decades(record.time, np.ones_like(record.time) if at_rest else record.rate)
+    return look.runs_through_decades(
+        record.time, np.ones_like(record.time) if at_rest else record.rate
+    )
 
 
 def symbol_of(records: Sequence[RunRecord]) -> str:
@@ -75,15 +53,6 @@ def along_in_common(records: Sequence[RunRecord]) -> str:
     return " or ".join(dict.fromkeys(record.along[0] for record in records))
 
 
-def _as_flow_curve(panel, record: RunRecord) -> None:
-    """Draw states with logarithmic axes, from a little below the least that was seen."""
-    seen = record.measured[record.measured > 0.0]
-    panel.set_xscale("log")
-    if seen.size == record.measured.size:
-        panel.set_yscale("log")
-        panel.set_ylim(0.5 * float(np.min(seen)), 3.0 * float(np.max(seen)))
-
-
 def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     found = {record.quantity for record in records}
     kinds = {quantity: FIGURE_SYMBOLS[quantity] for quantity in FIGURE_SYMBOLS if quantity in found}
@@ -94,11 +63,11 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     return f" {what} {', '.join(told)}." * (len(found) > 1)
 
 
-def runs_picture(result: LoopResult) -> Picture:
+def runs_picture(result: LoopResult) -> look.Picture:
     """Return every run: measured, the law as declared, and with effects."""
     records = result.records
     with drawn_runs(records) as drawing:
-        return picture(
+        return look.picture(
             drawing,
             "runs",
             "Measured and predicted, run by run."
@@ -124,7 +93,7 @@ def drawn_runs(
     """
     if not names[0]:
         records = [replace(r, predicted=r.predicted[-1:], errors=r.errors[-1:]) for r in records]
-    with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
+    with look.panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
         for panel, record in zip(panels, records, strict=True):
             every = max(1, record.time.size // 60)
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None), names)
@@ -134,9 +103,14 @@ def drawn_runs(
             margin = 0.05 * (high - low) or 1.0
             panel.set_ylim(low - margin, high + margin)
             if through_decades(record):
-                make_logarithmic(panel.xaxis)
+                look.make_logarithmic(panel.xaxis)
             if not record.is_transient:
-                _as_flow_curve(panel, record)
+                # from a little below the least that was seen
+                seen = record.measured[record.measured > 0.0]
+                panel.set_xscale("log")
+                if seen.size == record.measured.size:
+                    panel.set_yscale("log")
+                    panel.set_ylim(0.5 * float(np.min(seen)), 3.0 * float(np.max(seen)))
             elif high > THOUSANDS:
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
             panel.set_title(short_title(record), fontsize=8)
@@ -144,8 +118,8 @@ def drawn_runs(
         for panel, record in zip(panels, records, strict=True):
             if panel in below or not record.is_transient:
                 panel.set_xlabel(record.along[0])
-        label_rows(axes, [axis_label([record]) for record in records])
-        legend_above(drawing, axes)
+        look.label_rows(axes, [axis_label([record]) for record in records])
+        look.legend_above(drawing, axes)
         yield drawing
 
 
@@ -153,21 +127,19 @@ def draw_run(
     panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples,
     names: tuple[str, str] = (AS_DECLARED, WITH_EFFECTS),
 ) -> None:  # fmt: skip
-    """Draw the measured stress, the law as declared and with effects in one run.
+    """Draw the measured stress, the law as declared and with effects against what is given.
 
-    `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
-    `shown`: which samples are marked as measured, and between which the models are drawn. `names`:
-    as in `drawn_runs`.
+    `marked`, `shown`: which samples are marked as measured, and between which models are drawn.
     """
     colour = HELD_COLOUR if record.held_out else FIT_COLOUR
     if record.band is not None:
         label = "95 % of measurements, all explanations"
         style = {"color": colour, "alpha": 0.18, "lw": 0, "label": label}
-        shade_between(panel, along[shown], *record.band[:, shown], **style)
-    style = {"ms": 2.5, "mfc": "none", "mew": 0.7, "color": TRUTH, "label": "measured"}
+        look.shade_between(panel, along[shown], *record.band[:, shown], **style)
+    style = {"ms": 2.5, "mfc": "none", "mew": 0.7, "color": look.TRUTH, "label": "measured"}
     panel.plot(along[marked], record.measured[marked], "o", **style)
     if names[0]:
-        style = {"lw": 1.1, "color": BEFORE, "label": names[0]}
+        style = {"lw": 1.1, "color": look.BEFORE, "label": names[0]}
         panel.plot(along[shown], record.predicted[0][shown], "-.", **style)
     if len(record.predicted) > 1 or not names[0]:
         label = f"{names[1]}, {'held out' if record.held_out else 'fitted'}"
@@ -182,7 +154,7 @@ def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
 
 def short_title(record: RunRecord) -> str:
     """Return the name of a run, and below it its errors before and after."""
-    name = literal(shortened(record.name))
+    name = look.literal(shortened(record.name))
     if record.flow != "shear" and record.flow not in name:
         name = f"{name}, {record.flow}"
     errors = record.errors[[0, -1]] if len(record.errors) > 1 else record.errors
@@ -203,7 +175,7 @@ def shortened(name: str) -> str:
 _MOST_DRAWN = 4
 
 
-def lissajous_picture(result: LoopResult) -> Picture | None:
+def lissajous_picture(result: LoopResult) -> look.Picture | None:
     """Return σ12 against strain and against rate in the last cycle, or None without oscillation.
 
     The widest runs are shown, those held out before those fitted.
@@ -213,39 +185,35 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
     shown = found[:_MOST_DRAWN]
     if not shown:
         return None
-    with figure(2, len(shown), width=10.0, height=2.3) as (drawing, axes):
+    with look.figure(2, len(shown), width=10.0, height=2.3) as (drawing, axes):
         for column, (record, frequency) in enumerate(shown):
-            last = in_last_cycle(record.time, frequency)
-            strain = about_middle(record.strain, last)
+            last = look.in_last_cycle(record.time, frequency)
+            strain = look.about_middle(record.strain, last)
             for panel, along in ((axes[0, column], strain), (axes[1, column], record.rate)):
                 if not np.all(last):
                     panel.plot(
-                        along, record.measured, ".", ms=1.2, alpha=0.5, color=MEASURED,
+                        along, record.measured, ".", ms=1.2, alpha=0.5, color=look.MEASURED,
                         label="measured, all cycles", zorder=1,
                     )  # fmt: skip
                 draw_run(panel, record, along, last, last)
-                _frame(panel, record.measured)
+                low, high = float(record.measured.min()), float(record.measured.max())
+                margin = 0.6 * (high - low) or 1.0
+                panel.set_ylim(low - margin, high + margin)
             axes[0, column].set_title(short_title(record), fontsize=8)
             axes[0, column].set_xlabel("strain γ")
             axes[1, column].set_xlabel("γ̇ (1/s)")
         axes[0, 0].set_ylabel("elastic: σ₁₂ (Pa)")
         axes[1, 0].set_ylabel("viscous: σ₁₂ (Pa)")
-        legend_above(drawing, axes)
+        look.legend_above(drawing, axes)
         left = (
             f" The {_MOST_DRAWN} widest of {len(found)} runs." if len(found) > _MOST_DRAWN else ""
         )
-        return picture(
+        return look.picture(
             drawing,
             "lissajous",
             "Elastic (above) and viscous (below) Lissajous curves: models in the last cycle, "
             f"measurements in all of them, faint. Over each the errors of the run.{left}",
         )
-
-
-def _frame(panel, stress: np.ndarray) -> None:
-    low, high = float(stress.min()), float(stress.max())
-    margin = 0.6 * (high - low) or 1.0
-    panel.set_ylim(low - margin, high + margin)
 
 
 _AXES = {
@@ -263,22 +231,22 @@ _AXES = {
 }
 
 
-def free_form_picture(result: LoopResult) -> Picture | None:
+def free_form_picture(result: LoopResult) -> look.Picture | None:
     """Return each free function with its band; None where there is none."""
     panels = []
     for one in result.free_form:
         along, up = _AXES[one.slot]
-        band = one.grid, one.low95, one.high95, {"color": SHADE, "label": "95 % band"}
-        curve = one.grid, one.value, {"color": NETWORK, "lw": 1.5, "label": "free function"}
+        band = one.grid, one.low95, one.high95, {"color": look.SHADE, "label": "95 % band"}
+        curve = one.grid, one.value, {"color": look.NETWORK, "lw": 1.5, "label": "free function"}
         zero = one.grid[[0, -1]], [0.0, 0.0], {"color": "0.6", "lw": 0.6}
         labels = {"xlabel": along.format(variable=one.variable), "ylabel": up}
-        panels.append(Panel([curve, zero], labels, [band]))
+        panels.append(look.Panel([curve, zero], labels, [band]))
     said = "; ".join(map(free_form_sentence, result.free_form))
     caption = f"Effect without a name: {said}. The bands assume that it depends on this alone."
-    return row_of_panels("free_form", caption, panels, 9.0, 2.8) if panels else None
+    return look.row_of_panels("free_form", caption, panels, 9.0, 2.8) if panels else None
 
 
-def next_test_picture(result: LoopResult) -> Picture | None:
+def next_test_picture(result: LoopResult) -> look.Picture | None:
     """Return the predictions of all explanations in the best test; None where none decides."""
     following = result.next_tests
     best = following.best
@@ -287,7 +255,7 @@ def next_test_picture(result: LoopResult) -> Picture | None:
     curves = []
     lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
     for i, (effects, probability, curve) in enumerate(lines):
-        style = RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE
+        style = look.RIVAL_STYLES[(i - 1) % len(look.RIVAL_STYLES)] if i else look.CHOSEN_STYLE
         label = f"{effects_title(effects)} ({percent(probability)})"
         curves.append((best.samples, curve, {**style, "lw": 1.4 if i else 2.0, "label": label}))
     unit = "" if best.quantity == "strain" else " (Pa)"
@@ -301,4 +269,6 @@ def next_test_picture(result: LoopResult) -> Picture | None:
         f"What to measure next: {best.title}. Curves: predictions of the explanations, all of "
         f"which fit these data. Assumed noise: {percent(following.noise)}."
     )
-    return row_of_panels("next_test", caption, [Panel(curves, settings)], 7.0, 3.2, columns=1)
+    return look.row_of_panels(
+        "next_test", caption, [look.Panel(curves, settings)], 7.0, 3.2, columns=1
+    )

@@ -1,31 +1,115 @@
-"""The tables of a closed loop's page, as rows."""
+"""The report on a closed loop: page, tables, figures, JSON and LaTeX."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from discover.laws.registry import LAWS
-from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import CandidateScore, Fold, LawFit, Stage
+from discover.loop.parts import LawFit
 from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by
+from discover.plain_numbers import json_text
 from discover.protocols.kinematics import ONLY_STATES
-from discover.report.mathtext import formula
-from discover.report.page import safe_name
-from discover.report.wording import free_form_sentence, percent, sentence
+from discover.report.page import answer_screen, made_by, render, safe_name
+from discover.report.plots.loop.residual import (
+    by_mode_picture,
+    residual_picture,
+    waterfall_picture,
+)
+from discover.report.plots.loop.runs import (
+    AS_DECLARED,
+    WITH_EFFECTS,
+    free_form_picture,
+    lissajous_picture,
+    next_test_picture,
+    runs_picture,
+)
+from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
+from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
-from discover.words import (
-    FIGURE_SYMBOLS,
-    effect_title,
-    effects_title,
-    listed,
-    p_value,
-    readable,
-    significant,
-)
+from discover.study.run_folder import RunFolder
+from discover.words import effect_title, listed, p_value, significant
+
+
+def write_loop(
+    result: LoopResult,
+    folder: RunFolder,
+    name: str,
+    summary: str,
+    study_text: str = "",
+    run: dict | None = None,
+    conditions: str = "",
+) -> Path:
+    """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
+
+    Returns the page. `summary`: the data and declared model in words. `run`: what the page says of
+    the run that made it, where that was no command. `conditions`: material and temperature.
+    """
+    pictures = [
+        waterfall_picture(result),
+        runs_picture(result),
+        lissajous_picture(result),
+        free_form_picture(result),
+        residual_picture(result),
+        by_mode_picture(result.by_mode, result.verdict == "unexplained"),
+        next_test_picture(result),
+    ]
+    drawn = [p for p in pictures if p is not None]
+    for one in drawn:
+        folder.write(f"figures/{safe_name(one.name)}.svg", one.svg)
+    content = json_text(result.to_json())
+    folder.write("loop.json", content)
+    folder.write("equations.tex", loop_tex(result))
+    predictions = write_predictions(loop_predictions(result), folder)
+    page = render(
+        "loop.html",
+        data={PREDICTIONS: predictions, "loop.json": content},
+        name=name,
+        conditions=conditions,
+        summary=summary,
+        result=result,
+        screen=answer_screen(result.answer),
+        sentences=loop_verdict(result),
+        error_rows=error_rows(result),
+        noise_range=noise_range(result),
+        inclusion=inclusion(result),
+        kinds=KINDS,
+        remaining=remaining_rows(result),
+        small_faults=SMALL_FAULTS,
+        readings=[
+            (f"{name[:1].upper()}{name[1:]}", reading.sentences)
+            for name, reading in zip((AS_DECLARED, WITH_EFFECTS), result.readings, strict=True)
+            if name == AS_DECLARED or result.stages
+        ],
+        pictures=drawn,
+        run=run
+        or made_by(
+            folder.fingerprint,
+            f"discover close-loop {name}.toml",
+            ("loop.json", "predictions.csv", "equations.tex", "figures/*.svg"),
+            study_text,
+        ),
+    )
+    return folder.write("report.html", page)
+
+
+def loop_tex(result: LoopResult) -> str:
+    """Return what each stage added as LaTeX."""
+    lines = ["% Written by discover: what was added to the declared model, stage by stage."]
+    for stage in result.stages:
+        values = ", ".join(
+            f"{name} = {p.value:.6g} {p.unit} [{p.ci95[0]:.6g}, {p.ci95[1]:.6g}]"
+            for name, p in stage.parameters.items()
+        )
+        lines.append(
+            f"% {stage.effect} ({stage.kind}): {values}\n"
+            f"\\begin{{equation}}\n  {stage.equation}\n\\end{{equation}}"
+        )
+    return "\n".join(lines) + "\n"
+
 
 KINDS = {"constitutive": "in the fluid", "kinematic": "in the flow", "signal": "in the instrument"}
 
@@ -43,13 +127,10 @@ _UNTESTED = {
     "no_effect_needed": "Fitted, not tested: with its constants fitted your model describes",
 }
 
-_ALIKE = 0.05
-"""Probability of a law from which on these runs do not exclude it."""
-
+_ALIKE = 0.05  # Probability of a law from which on these runs do not exclude it
 _MEASURED = {"flows": "what was measured", "states": "the states that were measured"}
 
-_SLOW = 0.5
-"""Correlation from which noise and a slow effect look alike for some samples on end."""
+_SLOW = 0.5  # Correlation from which noise and a slow effect look alike for some samples on end
 
 
 def loop_verdict(result: LoopResult) -> list[str]:
@@ -72,14 +153,10 @@ def what_was_found(result: LoopResult) -> str:
         parts.append(free_form_sentence(result.free_form[0]))
     if result.laws:
         parts.append(_law_chosen(result.laws))
-    return sentence([_how_it_stands(result), *parts])
-
-
-def _how_it_stands(result: LoopResult) -> str:
-    """Return the verdict in words."""
+    stands = _LOOP[result.verdict] if doubted(result) is None else _OPEN
     if untested := untested_by(result):
-        return f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
-    return _LOOP[result.verdict] if doubted(result) is None else _OPEN
+        stands = f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
+    return sentence([stands, *parts])
 
 
 def _law_chosen(laws: Sequence[LawFit]) -> str:
@@ -89,15 +166,6 @@ def _law_chosen(laws: Sequence[LawFit]) -> str:
     told = f"; these runs do not exclude {several(alike)}" if alike else ""
     ends = f" ({several(best.at_end)} at an end of its range)" if best.at_end else ""
     return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
-
-
-def named(name: str, parameter: StageParameter) -> str:
-    """Return a parameter's name in the field's letters, and of one by mode, what it stands for."""
-    text = readable(name.replace("_", " ").replace("build up", "build-up"))
-    if not isinstance(parameter, ConstantByMode):
-        return text
-    time = significant(parameter.mean_time_s, 3)
-    return f"{text} (varies from mode to mode) at λ = {time} s"
 
 
 def how_sure(result: LoopResult) -> str:
@@ -177,23 +245,6 @@ def error_rows(result: LoopResult) -> list[dict[str, Any]]:
     return rows
 
 
-def run_rows(result: LoopResult) -> list[dict[str, Any]]:
-    """Return what each run holds, and its errors before and after."""
-    return [
-        {
-            "name": record.name,
-            "held_out": record.held_out,
-            "samples": record.time.size,
-            "end": float(record.time[-1]) if record.is_transient else None,
-            "rate": float(np.max(np.abs(record.rate))),
-            "stress": rms(record.measured),
-            "before": float(record.errors[0]),
-            "after": float(record.errors[-1]),
-        }
-        for record in result.records
-    ]
-
-
 def noise_range(result: LoopResult) -> list[float] | None:
     """Return the noise of each fitted run; None where it was given or comes from another residual.
 
@@ -206,51 +257,6 @@ def noise_range(result: LoopResult) -> list[float] | None:
         if noise and np.isclose(np.mean(noise), result.noise_floor, rtol=1e-3):
             return noise
     return None
-
-
-def stage_row(stage: Stage, number: int, letters: Mapping[str, str]) -> dict[str, Any]:
-    """Return what a stage added; its `number` tells its formula's marks from those of others.
-
-    `letters`: of its parameters, as its equation has them.
-    """
-    own = safe_name(stage.effect)
-    symbols = {name: formula(letter, f"{own}_{name}") for name, letter in letters.items()}
-    return {
-        "name": stage.effect,
-        "effect": effect_title(stage.effect),
-        "kind": KINDS[stage.kind],
-        "formula": formula(stage.equation, f"formula{number}"),
-        "parameters": [
-            {
-                "name": named(name, p) if isinstance(p, ConstantByMode) else name,
-                "symbol": symbols.get(name, "–"),
-                "value": p.value,
-                "ci95": p.ci95,
-                "unit": p.unit,
-                "left_open": name in stage.left_open,
-            }
-            for name, p in stage.parameters.items()
-        ],
-        "aliases": ", ".join(map(effect_title, stage.aliases)),
-        "source": stage.source,
-        "check": stage.check,
-        "error": stage.error,
-    }
-
-
-def explanations(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the explanations as lines of a table; none where there is only one that is certain."""
-    chosen = result.explanations.holding([stage.effect for stage in result.stages])
-    return [
-        {
-            "effects": effects_title(one.effects),
-            "twins": "; ".join(map(effects_title, one.twins)),
-            "probability": one.probability,
-            "error": one.error,
-            "chosen": one is chosen,
-        }
-        for one in result.explanations.likeliest_first
-    ]
 
 
 def inclusion(result: LoopResult) -> str:
@@ -270,69 +276,11 @@ def inclusion(result: LoopResult) -> str:
 _MOST_INCLUDED = 8
 
 
-_MOST_TESTS = 8
-
-
-def next_tests(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the tests that tell most of which explanation is right, as lines of a table."""
-    following = result.next_tests
-    titles = [effects_title(effects) for effects in following.explanations]
-    return [
-        {
-            "title": one.title,
-            "quantity": FIGURE_SYMBOLS[one.quantity],
-            "share": one.nats / following.open_nats,
-            "pairs": "; ".join(f"{titles[i]} from {titles[j]}" for i, j in one.pairs[:_MOST_PAIRS]),
-            "more": max(len(one.pairs) - _MOST_PAIRS, 0),
-        }
-        for one in following.tests[:_MOST_TESTS]
-    ]
-
-
-_MOST_PAIRS = 2
-
-
-def declared_effects(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the parameters of the effects that the study declares."""
-    return [
-        {"effect": effect_title(one.effect), "name": name, **asdict(parameter)}
-        for one in result.declared_effects
-        for name, parameter in one.parameters.items()
-    ]
-
-
-def fold_row(fold: Fold) -> dict[str, Any]:
-    """Return what was found without a run."""
-    return {
-        "run": fold.run,
-        "error_before": fold.error_before,
-        "error_after": fold.error_after,
-        "effects": ", ".join(map(effect_title, fold.effects)) or "none",
-    }
-
-
-MOST_RANKED = 12
-"""Candidates of a stage that are shown, the best."""
-
-
-def ranking_rows(ranking: Sequence[CandidateScore]) -> list[dict[str, Any]]:
-    """Return the best candidates of a stage."""
-    return [
-        {
-            "effect": effect_title(c.effect),
-            "kind": KINDS[c.kind],
-            "score": c.score,
-            "evidence": c.evidence,
-            "error": c.error,
-        }
-        for c in ranking[:MOST_RANKED]
-    ]
-
-
+# Last words of what is a share of the root-mean-square stress
 _SHARES = ("error", "floor", "gain", "clock")
-"""Last words of what is a share of the root-mean-square stress."""
 
 
+# What is said of the residual, for those who do not read the JSON
 _REMAINING = {
     "structured": "systematic residual",
     "error": "error on the fitted runs",
@@ -354,7 +302,6 @@ _REMAINING = {
     "loading deviation": "assumed scatter of loading, relative",
     "description": "summary",
 }
-"""What is said of the residual, for those who do not read the JSON."""
 
 
 def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
@@ -369,12 +316,6 @@ def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
         content["probability"] = p_value(chance)
     said = {"none", "None", "", "{}"}  # a row that says nothing is none
     return [(_REMAINING.get(k, k), value) for k, value in _flatten(content) if value not in said]
-
-
-def loadings(result: LoopResult) -> list[dict[str, Any]]:
-    """Return the factors of loadings, run by run; none where runs are none of their own."""
-    found = result.remaining.get("loading") or {}
-    return [{"run": name, **one} for name, one in found.items()]
 
 
 def _flatten(content: Any, prefix: str = "") -> list[tuple[str, str]]:
