@@ -17,7 +17,8 @@ from independent.folders import to_toml
 
 FOLDER, STUDY, COMPARISON = (SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON"))
 RESULTS, EXPORTS = SANE["RESULTS"], SANE["EXPORTS"]
-_TOLD = {"declared": {"law": RESULTS["loop.json"]["law"], "effects": []}, "stages": []}
+_TOLD = {"declared": {"law": RESULTS["loop.json"]["law"], "effects": []}, "stages": [],
+         "posterior": {"effects": [], "constants": {}}}  # fmt: skip
 _DATA = {**EXPORTS, "sweep.txt": SANE["SWEEP"]}
 _FORMS = ("python", "sympy", "latex", "json", "rheotool", "ufl")
 

@@ -211,11 +211,6 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
     yielding break these rules by less than another unit of stress or of time does. Another unit of
     rate may pass for thinning.
     """
-
-    def half_time(run: Run) -> float:
-        stress = np.abs(run.stress)
-        return float(run.time[int(np.argmax(stress >= 0.5 * np.max(stress)))])
-
     for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
         alike = [r for r in runs if r.flow == kind and r.from_rest and is_start_up(r)]
         if len(alike) < 2:
@@ -223,7 +218,7 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
         rates = np.array([abs(run.rate[0]) for run in alike])
         for what, quantity, rises in (
             ("The stress", lambda run: np.max(np.abs(run.stress)), True),
-            ("The time at which the stress rises", half_time, False),
+            ("The time at which the stress rises", _half_time, False),
         ):
             values = np.array([quantity(run) for run in alike])
             for run, ratio in zip(alike, _least_outside(values, rates, rises), strict=True):
@@ -240,6 +235,11 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         cold, hot = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
         names: dict[str, Any] = {"cold": cold, "hot": hot}
         yield found("two_temperatures", **names, lowest=known[cold], highest=known[hot])
+
+
+def _half_time(run: Run) -> float:
+    stress = np.abs(run.stress)
+    return float(run.time[int(np.argmax(stress >= 0.5 * np.max(stress)))])
 
 
 def _least_outside(values: Values, rates: Values, rises: bool) -> Values:
