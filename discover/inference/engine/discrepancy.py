@@ -200,7 +200,9 @@ class Discrepancy:
                 plain.append(own.T @ own)
                 cross.append(curve.T @ own)
                 inner.append(curve.T @ curve)
-            grams, logs = self._without_curves(sum(plain), np.array(cross), np.array(inner))
+            grams, logs = self._without_curves(
+                np.sum(plain, axis=0), np.array(cross), np.array(inner)
+            )
             base = self.fitter.noise.log_determinant(self.record, noise)
             self._kept[correlation] = _Products(
                 grams, base - logs, np.array(cross), np.array(inner)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset import Run
 from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import Discrepancy
@@ -216,7 +217,8 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     near = [fit for fit in alive if search.rank(fit) > best - WINDOW][:_MOST]
     whole, judged = search, near
     if problem.predicted is not None:
-        whole = _of_all_runs(search, near, done["whole"][0] if done else None)
+        every = [*problem.fitted.runs, *problem.predicted.runs]
+        whole = _fitted_to(every, search, near, done["whole"][0] if done else None)
         judged = whole.alive()
     logs = np.array([whole.rank(fit) for fit in judged])
     known = [*done["whole"][2], *([before.left] if before.left else [])] if before else []
@@ -246,12 +248,13 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     return found
 
 
-def _of_all_runs(search: Search, fits: Sequence[Fit], done: Search | None) -> Search:
-    """Return hypotheses fitted to all runs, those to predict too, beside what was done before."""
-    problem, wanted = search.problem, [*fits, search.found[frozenset()]]
+def _fitted_to(
+    runs: Sequence[Run], search: Search, fits: Sequence[Fit], done: Search | None
+) -> Search:
+    """Return hypotheses fitted to other runs, beside those of a search of these that was done."""
+    wanted = [*fits, search.found[frozenset()]]
     if done is None:
-        every = Rows.of([*problem.fitted.runs, *problem.predicted.runs])
-        done = refitted(wanted, Fitter(problem, every))
+        done = refitted(wanted, Fitter(search.problem, Rows.of(runs)))
     else:
         new = [fit for fit in wanted if frozenset(fit.names) not in done.found]
         if not new:
