@@ -93,7 +93,7 @@ def run_call(call: list[str] | Callable[[], object]) -> Outcome:
 
 
 _REMEDY = re.compile(
-    r"\b(add|change|check|choose|close|copy|correct|declare|download|export|give|install|keep"
+    r"\b(add|change|check|choose|close|copy|correct|declare|download|export|fix|give|install|keep"
     r"|known keys|leave|make|mend|must|name|names are case-sensitive|needs|one of|put|remove|rename"
     r"|replace|run|sample|save|say|see|set|should|sort|take|try|use|wait|widen|write"
     r"|is \S+ meant)\b",

@@ -123,7 +123,8 @@ def _found(content: Mapping[str, Any], file: Path) -> EarlierResult:
         )
     unexplained = content.get("verdict") == "unexplained"
     equation = equation_from_json(declared["law"], f"{file.name}: declared.law")
-    rows = [*declared.get("effects", ()), *added]
+    with _damage(file):
+        rows = [*declared.get("effects", ()), *added]
     # what was declared may be more than Maxwell's law
     if unexplained and not (rows or equation.terms or equation.named):
         raise InputError(

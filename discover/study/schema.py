@@ -271,7 +271,7 @@ class Model(Section):
         if by_hand[0] != by_hand[1]:
             raise ValueError(
                 "modulus_Pa and relaxation_time_s of modes go together, with as many values; got "
-                f"{by_hand[0] or 'no list'} and {by_hand[1] or 'no list'}"
+                f"{by_hand[0] or 'no list'} and {by_hand[1] or 'no list'}; write a list of each"
             )
         if by_hand[0] and self.modes is not None:
             raise ValueError(

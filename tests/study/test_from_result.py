@@ -226,6 +226,7 @@ _NOTHING = {
         ("loop.json", {**LOOP, "stages": [_OF_THREE]}, "damaged"),
         ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
         ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),
+        ("loop.json", {**LOOP, "declared": {**LOOP["declared"], "effects": 3}}, "is damaged"),
         ("loop.json", _NOTHING, "there is nothing to take"),
         ("loop.json", [1, 2], "is not a result of discover"),
         ("loop.json", {**LOOP, "declared": None}, "found a material that does not relax"),
