@@ -85,6 +85,22 @@ def test_moduli_at_one_frequency_are_no_solid():
     assert recognise(whole.records) is None
 
 
+@pytest.mark.parametrize("noise", [0.003, 0.03])
+def test_waves_of_one_frequency_that_may_have_gone_on_before_are_no_solid(noise):
+    # closed form of a Maxwell fluid in steady alternation, ω = λ = 1; control: a start-up as well,
+    # which a solid and a fluid do not follow alike
+    times = np.linspace(0.0, 12.0, 120)
+    waves = [
+        Run(f"{size}", times, oscillatory_shear(size, 1.0), size * np.cos(times),
+            noisy(50.0 * size * (np.sin(times) + np.cos(times)), noise, seed))
+        for seed, size in enumerate((0.5, 2.0))
+    ]  # fmt: skip
+    assert recognise(waves) is None
+    solid = recognise([*waves, *start_ups(lambda t, rate: rate * (50.0 * t + 50.0), noise)])
+    assert solid is not None
+    assert solid.law == "kelvin_voigt"
+
+
 def test_a_maxwell_fluid_and_a_power_law_are_none_of_them():
     w = FREQUENCIES
     assert recognise(sweep(100.0 * w**2 / (1.0 + w**2), 100.0 * w / (1.0 + w**2))) is None
