@@ -8,8 +8,9 @@ with u_i the signatures of all effects and terms that are not in the hypothesis,
 record at τ = 1 (this is the dense library, and says something of any flow), and d_r a smooth curve
 along the samples x of run r, b_rk ~ N(0, ρ² S_k), whose size may grow with the shear rate; or along
 the logarithm of the samples since the rate last stepped, where motor, tool and transducer are still
-on their way   [Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4,
-415, for τ by evidence]. ρ, τ, the stiffness of S and the growth are summed over a grid.
+on their way. Or all runs share one curve, b_k: noise as slow does not repeat itself   [Kennedy &
+O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4, 415, for τ by evidence]. ρ,
+τ, the stiffness of S and the growth are summed over a grid.
 """
 
 from dataclasses import dataclass
@@ -51,6 +52,9 @@ _AFTER_A_STEP = 10.0
 _TRANSIENT = 0.2
 """Prior share of discrepancies that follow steps of the rate and nothing else."""
 
+_SHARED = 0.2
+"""Prior share of discrepancies that are one curve in all runs."""
+
 _ALONE = 3
 """Samples over which a transient is taken: one that is off alone is a knock, and no transient."""
 
@@ -62,9 +66,21 @@ _THIRD = 1.0 / 3.0
 _CELLS = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
 """Ends of the cells of ρ of which `CURVES` are the middles."""
 
-_NO_CURVE = (0.0, STIFFNESS[0], 0.0, False)
 _LIKELY = 7.0
 _MOST = 12
+
+
+class _Curve(NamedTuple):
+    """One curve of the grid: ρ, half swings, power of the rate; where it runs, of which runs."""
+
+    size: float
+    stiffness: float
+    growth: float
+    after_a_step: bool = False
+    shared: bool = False
+
+
+_NO_CURVE = _Curve(0.0, STIFFNESS[0], 0.0)
 
 
 @dataclass(frozen=True)
@@ -132,10 +148,13 @@ class Discrepancy:
         self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
         self._curves = _cosines(rows) * rows.size[:, None]  # of each row's own run
-        self._grid = [
-            *product(CURVES, STIFFNESS, GROWTHS, (False,)),
+        curves = [
+            *product(CURVES, STIFFNESS, GROWTHS),
             *product(CURVES, STIFFNESS[-1:], GROWTHS[:1], (True,)),
         ]
+        if len(rows.runs) > 1:
+            curves += product(CURVES, STIFFNESS, GROWTHS[:2], (False,), (True,))
+        self._grid = [_Curve(*one) for one in curves]
         self._kept: dict[float, _Products] = {}
         self.members, self.log_factor = self._weighed()
 
@@ -175,13 +194,9 @@ class Discrepancy:
         scale[len(self.widths) :] *= terms
         return scale / self.fit.noise.common, log
 
-    def _deviations(self) -> Float[np.ndarray, "grid runs k"]:
-        """Return the deviations of the curves of each run, for each curve of the grid."""
-        found = np.zeros((len(self._grid), len(self.growth), 2 * _MODES))
-        for own, (size, stiffness, growth, after_a_step) in zip(found, self._grid, strict=True):
-            scale = size * np.exp(growth * self.growth)[:, None]
-            own[:, _half(after_a_step)] = scale * _spectrum(stiffness)
-        return found
+    def _swings(self, curve: _Curve) -> Float[np.ndarray, " runs"]:
+        """Return the size of a curve in each run, over the noise."""
+        return curve.size * np.exp(curve.growth * self.growth)
 
     def _noise(self, correlation: float) -> Noise:
         """Return noise of size one with a correlation."""
@@ -218,19 +233,25 @@ class Discrepancy:
         """Return products with each curve of the grid integrated out, and half log determinants.
 
         The first is without a curve. Curves of one spectrum differ in size alone, so that one
-        decomposition S K S = Q Λ Qᵀ of each run serves all of these.
+        decomposition S K S = Q Λ Qᵀ of each run serves all of these, and one of each growth for all
+        together.
         """
-        kinds = {}
-        for kind in {(stiffness, after) for _, stiffness, _, after in self._grid}:
-            half, spectrum = _half(kind[1]), _spectrum(kind[0])
-            scaled = spectrum[:, None] * inner[:, half, half] * spectrum
-            values, vectors = np.linalg.eigh(scaled)
-            along = np.swapaxes(vectors, 1, 2) @ (spectrum[:, None] * cross[:, half])
-            kinds[kind] = np.maximum(values, 0.0), along
-        grams, logs = [plain], [0.0]
-        for size, stiffness, growth, after_a_step in self._grid:
-            values, along = kinds[stiffness, after_a_step]
-            squares = (size * np.exp(growth * self.growth))[:, None] ** 2
+        kinds, grams, logs = {}, [plain], [0.0]
+        for curve in self._grid:
+            kind = curve._replace(size=1.0, growth=curve.growth if curve.shared else 0.0)
+            if kind not in kinds:
+                half, spectrum = _half(curve.after_a_step), _spectrum(curve.stiffness)
+                own, along = inner[:, half, half], cross[:, half]
+                if curve.shared:
+                    swings = self._swings(kind)
+                    own = np.einsum("r,rij->ij", swings**2, own)[None]
+                    along = np.einsum("r,rin->in", swings, along)[None]
+                values, vectors = np.linalg.eigh(spectrum[:, None] * own * spectrum)
+                along = np.swapaxes(vectors, 1, 2) @ (spectrum[:, None] * along)
+                kinds[kind] = np.maximum(values, 0.0), along
+            values, along = kinds[kind]
+            swings = np.array([curve.size]) if curve.shared else self._swings(curve)
+            squares = swings[:, None] ** 2
             taken = np.sqrt(squares / (1.0 + squares * values))[..., None] * along
             taken = taken.reshape(-1, len(plain))
             grams.append(plain - taken.T @ taken)
@@ -289,7 +310,7 @@ class Discrepancy:
                 break
             scale, _ = self._scale(*terms)
             mean, root = _posterior(self._products(correlation).gram[which], scale)
-            size, stiff, growth, _ = self._grid[which - 1] if which else _NO_CURVE
+            size, stiff, growth, *_ = self._grid[which - 1] if which else _NO_CURVE
             log = float(weight - total)
             members.append(
                 Member(
@@ -309,8 +330,14 @@ class Discrepancy:
         if np.isfinite(limit):
             inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
             share = 0.8 * inside + 0.2 * share
-        per = len(STIFFNESS) * len(GROWTHS) / (1.0 - _TRANSIENT), 1.0 / _TRANSIENT
-        return np.log([share[CURVES.index(size)] / per[after] for size, _, _, after in self._grid])
+        kinds = [(one.after_a_step, one.shared) for one in self._grid]
+        known = {(True, False): _TRANSIENT, (False, True): _SHARED}
+        of_kind = {kind: known.get(kind, 0.0) for kind in kinds}
+        of_kind[False, False] = 1.0 - sum(of_kind.values())
+        each = [of_kind[kind] * len(CURVES) / kinds.count(kind) for kind in kinds]
+        return np.log(
+            [share[CURVES.index(c.size)] * p for c, p in zip(self._grid, each, strict=True)]
+        )
 
     def sizes(self, draws: int, lot: np.random.Generator) -> Float[np.ndarray, "draws runs"]:
         """Return draws of the root mean square of the discrepancy of each run, over its size."""
@@ -335,16 +362,21 @@ class Discrepancy:
     def _drawn_curves(self, member: Member, own: np.ndarray, lot: np.random.Generator):
         """Return draws of the curves of all runs, given constants and terms, in Pa."""
         products, rows = self._products(member.correlation), self.fitter.rows
-        out = np.zeros((len(own), len(self.left)))
-        deviations = self._deviations()[member.which - 1]
-        for i, d in enumerate(deviations):
-            inner = np.eye(len(d)) + d[:, None] * products.inner[i] * d
-            right = d[:, None] * (products.cross[i][:, :1] - products.cross[i][:, 1:] @ own.T)
+        curve, out = self._grid[member.which - 1], np.zeros((len(own), len(self.left)))
+        half, spectrum = _half(curve.after_a_step), _spectrum(curve.stiffness)
+        swings = self._swings(curve)
+        for runs in [np.arange(len(swings))] if curve.shared else np.arange(len(swings))[:, None]:
+            d, size = swings[runs], len(spectrum)
+            inner = np.einsum("r,rij->ij", d**2, products.inner[runs, half, half])
+            cross = np.einsum("r,rin->in", d, products.cross[runs, half])
+            inner = np.eye(size) + spectrum[:, None] * inner * spectrum
+            right = spectrum[:, None] * (cross[:, :1] - cross[:, 1:] @ own.T)
             middle = np.linalg.solve(inner, right).T
             normal = lot.standard_normal(middle.shape)
             spread = member.noise * np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
-            own_rows = rows.run == i
-            out[:, own_rows] = ((middle + spread) * d) @ self._curves[own_rows].T
+            there = np.isin(rows.run, runs)
+            along = self._curves[there, half] * swings[rows.run[there], None]
+            out[:, there] = ((middle + spread) * spectrum) @ along.T
         return out
 
 
