@@ -7,6 +7,7 @@ import pytest
 from independent.folders import write_folder
 from independent.instruments import Instrument
 from independent.worlds import MODULUS, TIME, draw_world
+from scipy.signal import lfilter
 
 import discover as dc
 from discover.forward import DeclaredModel
@@ -215,3 +216,25 @@ def test_no_curve_is_told_of_a_sound_instrument_named_law_or_not(asked, world):
     assert not any(one.is_shown for one in found)
     # in 1 of 20 at most it weighs as much as all that has a name
     assert all(one.log_odds_in_all < np.log(0.05) for one in found if world != POM_POM)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_all_runs_leave_alike_is_no_noise_and_what_each_leaves_is(tmp_path, seed):
+    # 5 % in one shape in four runs, and as much noise that decays by a factor of e in 20 samples
+    shapes, noises = {}, {}
+    runs = draw_world(*GIESEKUS).make(np.random.default_rng(1))
+    for i, name in enumerate(("a.csv", "b.csv", "c.csv", "held_e.csv")):
+        kept = {n: getattr(runs[name], n)[::3] for n in ("time", "rate", "stress")}
+        run = replace(runs[name], **kept)
+        size, place = 0.05 * np.sqrt(np.mean(run.stress**2)), np.linspace(0.0, 1.0, len(run.time))
+        lot = np.random.default_rng([seed, i]).standard_normal(len(run.time))
+        decay = 0.95
+        slow = lfilter([1.0], [1.0, -decay], lot * np.append(1.0, np.full(39, 1 - decay**2)) ** 0.5)
+        wave = np.sqrt(2.0) * np.cos(np.pi * (2.5 * place + 0.2 * seed))
+        shapes[name] = replace(run, stress=run.stress + size * wave)
+        noises[name] = replace(run, stress=run.stress + size * slow)
+    alike = explain(problem_of(tmp_path / "alike", shapes, FEW))
+    assert alike.unexplained > 0.99
+    own = explain(problem_of(tmp_path / "own", noises, FEW))
+    assert own.verdict == "effects_added"
+    assert own.explanations[0].members[0] == ("giesekus_mobility",)
