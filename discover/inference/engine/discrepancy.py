@@ -153,7 +153,7 @@ class Discrepancy:
             *product(CURVES, STIFFNESS[-1:], GROWTHS[:1], (True,)),
         ]
         if len(rows.runs) > 1:
-            curves += product(CURVES, STIFFNESS, GROWTHS[:2], (False,), (True,))
+            curves += product(CURVES, STIFFNESS, GROWTHS[:1], (False,), (True,))
         self._grid = [_Curve(*one) for one in curves]
         self._kept: dict[float, _Products] = {}
         self.members, self.log_factor = self._weighed()
@@ -233,25 +233,21 @@ class Discrepancy:
         """Return products with each curve of the grid integrated out, and half log determinants.
 
         The first is without a curve. Curves of one spectrum differ in size alone, so that one
-        decomposition S K S = Q Λ Qᵀ of each run serves all of these, and one of each growth for all
-        together.
+        decomposition S K S = Q Λ Qᵀ of each run, or of all together, serves all of these.
         """
         kinds, grams, logs = {}, [plain], [0.0]
         for curve in self._grid:
-            kind = curve._replace(size=1.0, growth=curve.growth if curve.shared else 0.0)
+            kind = curve._replace(size=1.0, growth=0.0)
             if kind not in kinds:
                 half, spectrum = _half(curve.after_a_step), _spectrum(curve.stiffness)
                 own, along = inner[:, half, half], cross[:, half]
                 if curve.shared:
-                    swings = self._swings(kind)
-                    own = np.einsum("r,rij->ij", swings**2, own)[None]
-                    along = np.einsum("r,rin->in", swings, along)[None]
+                    own, along = (np.sum(one, axis=0)[None] for one in (own, along))
                 values, vectors = np.linalg.eigh(spectrum[:, None] * own * spectrum)
                 along = np.swapaxes(vectors, 1, 2) @ (spectrum[:, None] * along)
                 kinds[kind] = np.maximum(values, 0.0), along
             values, along = kinds[kind]
-            swings = np.array([curve.size]) if curve.shared else self._swings(curve)
-            squares = swings[:, None] ** 2
+            squares = self._swings(curve)[: len(values), None] ** 2
             taken = np.sqrt(squares / (1.0 + squares * values))[..., None] * along
             taken = taken.reshape(-1, len(plain))
             grams.append(plain - taken.T @ taken)
