@@ -16,7 +16,6 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.results import TermTables
 from discover.plain_numbers import plain
 from discover.protocols.between_samples import sampling_interval
-from discover.protocols.kinematics import FOLLOWED
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
@@ -227,7 +226,7 @@ def _lack_of_fit(
     expectation: Expectation,
     normal_stresses_used: bool,
 ) -> LackOfFit:
-    residuals, records, rates, even, intervals = [], [], [], [], []
+    residuals, records, even, intervals = [], [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
         for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
@@ -242,11 +241,8 @@ def _lack_of_fit(
             residuals.append(prediction[quantity] - record)
             records.append(record)
             even.append(flow.even(record))
-            rates.append(np.asarray(flow.rate, dtype=float))
             intervals.append(sampling_interval(flow.times, flow.protocol, quantity))
-    # moduli that are constant are those of a linear fluid, and of no dead sensor
-    imposed = rates if all(flow.protocol.control in FOLLOWED for flow in training) else None
-    return lack_of_fit(residuals, records, expectation, imposed, even, intervals)
+    return lack_of_fit(residuals, records, expectation, even, intervals)
 
 
 _PHYSICS_FLOWS = ("training", "held_out", "test")

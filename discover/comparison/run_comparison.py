@@ -23,7 +23,7 @@ from discover.comparison.flows import (
 from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, study_library
-from discover.comparison.outcome import LearnerOutcome, expectation_of, lacks_of_fit
+from discover.comparison.outcome import expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
@@ -89,6 +89,10 @@ def _law_and_modes(model: StudyModel, study: Study) -> str:
     return f"{text}; {model.solid.rstrip('.')}" if model.solid else text
 
 
+_NO_LAW = "The data hold no signal, so no law was identified"
+_NO_FLUID = "noise and the instrument alone, without a fluid, are as likely"
+
+
 @in_one_thread
 def compare(
     study: Study, seed: int | None = None, progress: Progress = silent,
@@ -138,11 +142,18 @@ def compare(
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
     found = found.with_curves()
-    silent_ = found.ended().verdict == "no_signal"
-    outcomes = {
-        name: _told(replace(one, terms=proposed[name].terms), silent_)
-        for name, one in outcomes.items()
-    }
+    outcomes = {name: replace(one, terms=proposed[name].terms) for name, one in outcomes.items()}
+    left = lacks_of_fit(
+        outcomes, frame.flows, expectation_of(study, declared, data), options.use_normal_stresses
+    )
+    if found.ended().verdict == "no_signal":
+        outcomes = {
+            name: replace(one, terms=(), message=_NO_LAW, details={})
+            for name, one in outcomes.items()
+        }
+        left = {
+            name: replace(one, verdict="no_signal", reason=_NO_FLUID) for name, one in left.items()
+        }
     comparison = Comparison(
         name=study.name,
         data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
@@ -152,10 +163,7 @@ def compare(
         outcomes=outcomes,
         posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
-        lack_of_fit=lacks_of_fit(
-            outcomes, frame.flows, expectation_of(study, declared, data),
-            options.use_normal_stresses,
-        ),
+        lack_of_fit=left,
         truth=_truth(study, declared),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
         seed=learning.seed,
@@ -199,14 +207,6 @@ def _of_material(
             data.dataset, study.data.material, data.dataset.name
         ),
     )  # fmt: skip
-
-
-def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
-    """Return an outcome without terms where the data hold no signal."""
-    if not is_silent:
-        return outcome
-    message = "The data hold no signal, so no law was identified"
-    return replace(outcome, terms=(), message=message, details={})
 
 
 def _with_what_is_open(

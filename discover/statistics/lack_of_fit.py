@@ -1,14 +1,14 @@
 """Is what a model leaves of the records noise? One answer, for a comparison and for a loop."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.outliers import holds_signal, stray
+from discover.statistics.noise.outliers import stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
 from discover.statistics.noise.whiteness import (
     FEWEST_TESTED,
@@ -85,7 +85,6 @@ def lack_of_fit(
     residuals: Sequence[Float[np.ndarray, " _"]],
     measured: Sequence[Float[np.ndarray, " _"]],
     expectation: Expectation | None = None,
-    rates: Sequence[Float[np.ndarray, " _"]] | None = None,
     even: Sequence[Float[np.ndarray, " _"]] | None = None,
     intervals: Sequence[float] | None = None,
 ) -> LackOfFit:
@@ -95,38 +94,17 @@ def lack_of_fit(
 
     `residuals`: prediction minus measurement of each fitted run, in any unit. `measured`: the
     measurements, in the same unit. `expectation`: what a complete model may leave; by default noise
-    of unknown size. `rates`: what was imposed, at the samples; with them a record that never
-    follows it is told. `even`: by what records and residuals are multiplied so that their noise has
-    one size; by default by nothing.
-    """
-    factors = [np.ones(len(record)) for record in measured] if even is None else even
-    residuals, records = (
-        [factor * row for factor, row in zip(factors, rows, strict=True)]
-        for rows in (residuals, measured)
-    )
-    left = what_is_left(residuals, records, expectation, intervals)
-    if holds_signal(measured, rates):
-        return left
-    return replace(
-        left,
-        verdict="no_signal",
-        reason="the data are noise about a constant, whatever was imposed",
-    )
-
-
-def what_is_left(
-    residuals: Sequence[Float[np.ndarray, " _"]],
-    measured: Sequence[Float[np.ndarray, " _"]],
-    expectation: Expectation | None = None,
-    intervals: Sequence[float] | None = None,
-) -> LackOfFit:
-    """Return the same of records that are known to hold a signal; see `lack_of_fit`.
-
-    `residuals`, `measured`, `expectation`: as there. `intervals`: time between neighbouring samples
-    of each run, by which the correlations of their noise are held against one another
+    of unknown size. `even`: by what records and residuals are multiplied so that their noise has
+    one size; by default by nothing. `intervals`: time between neighbouring samples of each run, by
+    which the correlations of their noise are held against one another
     (`same_correlation_probability`); not a number of what is recorded otherwise. Without them they
     are not.
     """
+    if even is not None:
+        residuals, measured = (
+            [factor * row for factor, row in zip(even, rows, strict=True)]
+            for rows in (residuals, measured)
+        )
     expectation = expectation or Expectation()
     residual, weight, record, outliers = _without_outliers(residuals, measured)
     further = _further(residual, weight, intervals)

@@ -93,3 +93,4 @@ def test_in_noise_neither_finds_a_signal(tmp_path):
         tmp_path, Giesekus(MOBILITY), lambda s, g: 5.0 * g.standard_normal(len(s))
     )
     assert (compared.verdict, looped.verdict) == ("no_signal", "no_signal")
+    assert compared.lack_of_fit["tensor_sindy"].verdict == "no_signal"

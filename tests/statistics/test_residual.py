@@ -6,7 +6,6 @@ from independent import Giesekus, Modes, UpperConvectedMaxwell, oscillation, sta
 from independent.noise import correlated, proportional, rms, white
 
 from discover.statistics import lack_of_fit
-from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
 from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
 from discover.statistics.residual import Expectation, judging, noise_floor, tells_noise
@@ -147,7 +146,7 @@ def test_plain_noise_of_short_runs_is_taken_for_structure_as_seldom_as_the_level
 def test_few_short_runs_of_noise_are_explained():
     records = [np.ones(12)] * 3
     verdicts = [
-        what_is_left(list(noise_short(np.random.default_rng(seed), 3, 12)), records).verdict
+        lack_of_fit(list(noise_short(np.random.default_rng(seed), 3, 12)), records).verdict
         for seed in range(60)
     ]
     # 1 % of 60: more than 4 has a probability below 1e-3
@@ -160,7 +159,7 @@ def test_six_runs_of_fifteen_samples_show_a_misfit_as_large_as_their_noise():
     misfit *= 0.01 / np.sqrt(np.mean(misfit**2))
     records = [-np.expm1(-TIMES)] * 6
     found = [
-        what_is_left(list(noise_short(np.random.default_rng(seed)) + misfit), records).verdict
+        lack_of_fit(list(noise_short(np.random.default_rng(seed)) + misfit), records).verdict
         for seed in range(20)
     ]
     # a misfit that is seen nine times in ten is missed more than five times of 20 once in 10,000
@@ -171,17 +170,17 @@ def test_what_short_runs_cannot_tell_is_said():
     # no larger than a pattern of noise may be, and yet a pattern
     bent = 0.008 * np.cos(np.linspace(0.0, np.pi, 15))
     residuals = list(bent + noise_short(np.random.default_rng(1)))
-    assert "do not tell correlated noise" in what_is_left(residuals, [np.ones(15)] * 6).reason
+    assert "do not tell correlated noise" in lack_of_fit(residuals, [np.ones(15)] * 6).reason
     # changes from sample to sample, as noise does
-    few = what_is_left([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
+    few = lack_of_fit([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
     assert few.probability is None
     assert "too few samples" in few.reason
     # 8 samples of plain noise look like more than noise one time in five
     row = noise_short(np.random.default_rng(0), 1, 8)[0] + np.linspace(-0.1, 0.1, 8)
-    open_ = what_is_left([row], [np.ones(8)])
+    open_ = lack_of_fit([row], [np.ones(8)])
     assert open_.verdict == "unexplained"
     assert "hardly tell" in open_.reason
-    assert "hardly tell" not in what_is_left([row] * 3, [np.ones(8)] * 3).reason
+    assert "hardly tell" not in lack_of_fit([row] * 3, [np.ones(8)] * 3).reason
 
 
 def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():

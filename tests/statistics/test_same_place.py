@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics import lack_of_fit
 from discover.statistics.noise.whiteness import noise_probability, same_place_probability
 from discover.statistics.residual import Expectation, noise_floor
 
@@ -26,7 +26,7 @@ def newtonian_missed_at_the_start(seed: int = 0) -> tuple[np.ndarray, np.ndarray
 @pytest.mark.parametrize("runs", [1, 5])
 def test_a_start_that_every_run_misses_is_no_noise(runs):
     residual, measured = newtonian_missed_at_the_start()
-    left = what_is_left([*residual[:runs]], [*measured[:runs]])
+    left = lack_of_fit([*residual[:runs]], [*measured[:runs]])
     assert left.verdict == "unexplained"
     assert left.outliers == 0
     # of 61 samples in one run the size is known to 10 %, to half of that in five
@@ -35,7 +35,7 @@ def test_a_start_that_every_run_misses_is_no_noise(runs):
 
 def test_without_the_start_noise_is_left():
     residual, measured = newtonian_missed_at_the_start()
-    assert what_is_left([*residual[:, 1:]], [*measured[:, 1:]]).verdict == "explained"
+    assert lack_of_fit([*residual[:, 1:]], [*measured[:, 1:]]).verdict == "explained"
 
 
 def test_a_loud_start_that_differs_from_run_to_run_is_noise():
@@ -57,7 +57,7 @@ def test_knocks_at_different_places_are_outliers_and_at_one_place_structure(
 ):
     left = noise(1)
     left[np.arange(5), places] += 0.5
-    told = what_is_left([*left], [*(1.0 - left)])
+    told = lack_of_fit([*left], [*(1.0 - left)])
     assert (told.verdict, told.outliers) == (verdict, outliers)
 
 
