@@ -8,7 +8,6 @@ from discover.statistics.noise.whiteness import noise_probability, same_place_pr
 from discover.statistics.residual import Expectation, noise_floor
 
 NOISE, SAMPLES = 0.01, 61
-WEIGHT = np.full((5, SAMPLES), 1.0 / np.sqrt(SAMPLES))
 
 
 def noise(seed: int) -> np.ndarray:
@@ -70,10 +69,9 @@ def test_few_samples_do_not_hide_a_misfit_in_the_noise():
     floors = []
     for seed in range(20):
         noise = NOISE * np.random.default_rng(seed).standard_normal((4, 8))
-        weight = np.full((4, 8), 1.0 / np.sqrt(8.0))
-        residual = (missed + noise) * weight
-        probability = noise_probability(residual, weight)
-        floors.append(noise_floor(residual, weight, probability))
-        assert not Expectation().explains(residual, weight, probability, floors[-1])
+        rows = missed + noise
+        probability = noise_probability(rows, np.ones_like(rows))
+        floors.append(noise_floor([*rows], probability))
+        assert not Expectation().explains([*rows], probability, floors[-1])
     # 16 differences tell it to 40 %, the mean of 20 draws to 9 %; the bends of the misfit add some
     assert np.mean(floors) < 1.5 * NOISE
