@@ -33,7 +33,7 @@ from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
-from discover.loop.search_time import ComparisonTime
+from discover.loop.search_progress import ComparisonProgress
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
 from discover.progress import Progress, silent
@@ -130,15 +130,13 @@ def compare(
         if simple is not None:
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
-    several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
-    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
+    done = ComparisonProgress(progress, MOST_EFFECTS, len(declared.modulus) > 1)
     progress("searching among laws, effects and terms", 0.0)
-    found = search_hypotheses(study, data, declared, library, times.searching)
+    found = search_hypotheses(study, data, declared, library, done.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
-    times.learning()
 
-    own = learning.outcomes(options.learners, frame, times.learned)
-    times.weighing("weighing what was found")
+    own = learning.outcomes(options.learners, frame, done.learned)
+    done.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
     found = found.with_curves()
