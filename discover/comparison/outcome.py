@@ -98,7 +98,7 @@ def _bands(
     if len(result.members) < 2:
         return {}
     others = [replace(fluid, law=law) for law in result.members if law is not result.law]
-    members = [own, *(simulated(member, flows).predictions for member in others)]
+    members = [own, *(simulated(member, flows)[0] for member in others)]
     bands: dict[str, Limits | None] = {}
     for flow in flows:
         if flow.kind not in DRAWN:
@@ -248,22 +248,12 @@ def _lack_of_fit(
 _PHYSICS_FLOWS = ("training", "held_out", "test")
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """What a fluid does in flows.
+def simulated(
+    fluid: Fluid, flows: Sequence[Flow]
+) -> tuple[dict[str, Stresses | None], identify.Seen]:
+    """Return what a fluid does in flows, by key, and what the checks of its physics are made of.
 
-    `predictions`: by the key of the flow; None where the law diverges. `seen`: what the checks of
-    its physics are made of.
-    """
-
-    predictions: Mapping[str, Stresses | None]
-    seen: identify.Seen
-
-
-def simulated(fluid: Fluid, flows: Sequence[Flow]) -> Simulated:
-    """Return what a fluid does in flows.
-
-    Training flows set the box beyond which the law extrapolates.
+    None where the law diverges. Training flows set the box beyond which the law extrapolates.
     """
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along
@@ -274,15 +264,13 @@ def simulated(fluid: Fluid, flows: Sequence[Flow]) -> Simulated:
     # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
     seen = identify.see(fluid, protocols, times, weissenberg, max(deborah, weissenberg / 5.0))
     pairs = zip(flows, seen.along.observed, strict=True)
-    return Simulated(
-        {flow.key: columns_of(o) if np.all(np.isfinite(o)) else None for flow, o in pairs}, seen
-    )
+    return {f.key: columns_of(o) if np.all(np.isfinite(o)) else None for f, o in pairs}, seen
 
 
-def physics_of(found: Simulated, flows: Sequence[Flow]) -> dict[str, Any]:
+def physics_of(seen: identify.Seen, flows: Sequence[Flow]) -> dict[str, Any]:
     """Return checks of a fluid's physical soundness along the flows, as JSON-able values."""
     names = {i: flow.title for i, flow in enumerate(flows) if flow.kind in _PHYSICS_FLOWS}
-    return identify.check_physics(found.seen, names).to_json()
+    return identify.check_physics(seen, names).to_json()
 
 
 def _frequency(flow: Flow) -> float:

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float
 
 from discover.identify import physics_flows
@@ -13,7 +12,6 @@ from discover.laws import Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
 from discover.protocols.protocol import FlowProtocol
-from discover.summary_view import SentenceAndTable, table_of
 from discover.words import percent_of, plainly
 
 _ROUNDING = 1e-6
@@ -47,13 +45,9 @@ class PhysicsCheck:
     where: str  # where it is taken, or where the law fails, in words
     text: str  # one sentence for a reader
 
-    def line(self) -> dict[str, Any]:
-        """Return the check as one line of a table."""
-        return {"check": self.name, "passed": self.passed, "value": self.value, "text": self.text}
-
 
 @dataclass(frozen=True)
-class PhysicsReport(SentenceAndTable):
+class PhysicsReport:
     """All checks of a law."""
 
     checks: tuple[PhysicsCheck, ...]  # in a fixed order
@@ -68,10 +62,6 @@ class PhysicsReport(SentenceAndTable):
         if not failed:
             return "The law passes every check of physical soundness that could be made."
         return "The law fails: " + ", ".join(failed) + "."
-
-    def table(self) -> pd.DataFrame:
-        """Return the checks, one line each."""
-        return table_of(self.checks)
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as ``comparison.json`` holds it."""

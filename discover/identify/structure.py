@@ -35,7 +35,7 @@ from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.laws.expansion import expansion_of, law_of_terms
 from discover.learners.runs import as_runs
 from discover.programs import compiled
-from discover.summary_view import NotebookView, SentenceAndTable, table_of
+from discover.summary_view import NotebookView, table_of
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 
@@ -165,7 +165,7 @@ class LawStructure(NotebookView):
 
 
 @dataclass(frozen=True)
-class Structure(SentenceAndTable):
+class Structure(NotebookView):
     """What an experiment can determine of a library, at the known part and at nominal laws."""
 
     laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
@@ -184,6 +184,10 @@ class Structure(SentenceAndTable):
     def table(self) -> pd.DataFrame:
         """Return how many combinations stay unseen, and the verdicts, one line for each law."""
         return table_of(self.laws)
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the structure as ``comparison.json`` holds it."""
