@@ -31,33 +31,6 @@ def by_scipy(law, flow, times):
     return np.stack([found.sigma12, found.N1, found.N2], axis=-1)
 
 
-def test_maxwell_start_up_matches_the_analytic_solution():
-    times, rate = np.linspace(0, 8, 33), 1.7
-    stress = simulate(Fluid.dimensionless(UpperConvectedMaxwell()), start_up(rate), times)
-    decay = np.exp(-times)
-    np.testing.assert_allclose(stress.shear_stress, rate * (1 - decay), atol=1e-7)
-    np.testing.assert_allclose(
-        stress.first_normal_stress_difference, 2 * rate**2 * (1 - decay * (1 + times)), atol=1e-6
-    )
-    np.testing.assert_allclose(stress.second_normal_stress_difference, 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("frequency", [0.3, 1.0, 4.0])
-def test_small_oscillation_gives_the_maxwell_moduli(frequency):
-    times = np.linspace(0, 40, 2001)
-    amplitude = 1e-3
-    stress = simulate(
-        Fluid.dimensionless(Giesekus(0.3)), oscillatory_shear(amplitude, frequency), times
-    )
-    late = times > 25.0  # exp(-25) of the start is left
-    basis = np.stack([np.cos(frequency * times), np.sin(frequency * times)], axis=1)[late]
-    in_phase, out_of_phase = np.linalg.lstsq(basis, stress.shear_stress[late], rcond=None)[0]
-    viscosity = 1.0 / (1.0 + frequency**2)
-    # nonlinearity enters at the square of the strain amplitude, 1e-5 here
-    assert in_phase / amplitude == pytest.approx(viscosity, rel=1e-4)
-    assert out_of_phase / amplitude == pytest.approx(frequency * viscosity, rel=1e-4)
-
-
 @pytest.mark.slow
 def test_stiff_nonlinear_spectrum_agrees_with_an_implicit_scipy_method():
     fluid = Fluid(Giesekus(0.3), *SPECTRUM)
