@@ -23,7 +23,6 @@ from discover.protocols import (
     recorded_at,
     shear_rates,
     start_up,
-    step_rates,
 )
 from discover.simulate import simulate
 
@@ -62,14 +61,6 @@ def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     np.testing.assert_allclose(adaptive, exact, rtol=1e-6)
     np.testing.assert_allclose(fixed, exact, rtol=1e-5)
     np.testing.assert_allclose(in_the_loop([protocol])[0], exact, rtol=1e-4)
-
-
-def test_shear_beside_extension_is_what_it_is_alone():
-    shear = step_rates([0.0, 2.0], [1.0, -0.5])
-    stretched = in_flow(start_up(0.6), "uniaxial")
-    both = in_the_loop([shear, stretched])
-    np.testing.assert_allclose(both[0], in_the_loop([shear])[0], rtol=1e-9)
-    np.testing.assert_allclose(both[1], in_the_loop([stretched])[0], rtol=1e-9)
 
 
 def test_relaxation_after_a_step_of_strain_is_that_of_scipy():

@@ -14,7 +14,7 @@ from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grid import make_grid
-from discover.forward.of_fluids import bare_run, observed, observed_in
+from discover.forward.of_fluids import observed_in
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.classical import Giesekus
@@ -58,16 +58,6 @@ def test_a_steady_state_follows_the_mobility_as_its_differences_do():
     expected = (stress(MOBILITY + step) - stress(MOBILITY - step)) / (2.0 * step)
     for derivative in (jax.jacfwd(stress), jax.jacrev(stress)):
         np.testing.assert_allclose(jax.jit(derivative)(MOBILITY), expected, rtol=1e-6, atol=1e-9)
-
-
-def test_a_batch_holds_what_goes_on_in_time_and_what_is_steady_in_the_order_of_its_runs():
-    times = np.linspace(0.0, 40.0, 5)
-    flows = [start_up(1.0), steady_rates(RATES), start_up(30.0)]
-    runs = [bare_run(*pair) for pair in zip(flows, (times, COUNTED, times), strict=True)]
-    (found,) = observed([giesekus()], make_batch(runs))
-    # every start-up ends in the steady state of its rate, exp(−40) away
-    np.testing.assert_allclose(found[0, 4], found[1, 1], rtol=1e-6)
-    np.testing.assert_allclose(found[2, 4], found[1, 2], rtol=1e-6)
 
 
 def test_a_law_without_a_steady_state_says_so():
