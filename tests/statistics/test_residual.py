@@ -38,13 +38,6 @@ def noise(correlation=0.0, seed=0, size=0.01):
     return [correlated(still, size, correlation, lot) - still for _ in range(RUNS)]
 
 
-@pytest.mark.parametrize("correlation", [pytest.param(0.0, marks=pytest.mark.slow), 0.6])
-def test_noise_is_rarely_taken_for_structure(correlation):
-    taken = [not is_noise(noise(correlation, seed)) for seed in range(100)]
-    # significance 0.001: more than 3 of 100 has a probability below 1e-5
-    assert sum(taken) <= 3
-
-
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
 @pytest.mark.parametrize(
     "pattern",
