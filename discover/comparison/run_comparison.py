@@ -67,26 +67,15 @@ def data_in_words(data: StudyData, study: Study) -> str:
 
 def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
     """Return what was known before, and what was fitted with the likeliest hypothesis."""
-    text = _law_and_modes(frame.model, study)
+    text = f"{frame.model.described}, {frame.model.modes_in_words}"
+    if not study.model.known_relaxation:
+        text = "upper convected Maxwell without its relaxation term (a purely elastic solid)"
     if declared.free_constants:
         text += f" ({', '.join(declared.free_constants)} fitted)"
     if frame.effects:
         taken = ", ".join(effect.text for effect in frame.effects)
         text += f"; corrected for in the data: {taken}"
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
-
-
-def _law_and_modes(model: StudyModel, study: Study) -> str:
-    if not study.model.known_relaxation:
-        return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
-    named = LAWS.get(model.law_name)
-    title = model.law_name if named is None else named.described(model.parameters)
-    modes = len(model.modulus)
-    source = " from the linear sweep" if study.model.from_ is None else ""
-    text = title if modes == 1 else f"{title}, {modes} relaxation modes{source}"
-    if model.solvent_viscosity:
-        text += f", a solvent of {model.solvent_viscosity:.4g} Pa s"
-    return f"{text}; {model.solid.rstrip('.')}" if model.solid else text
 
 
 _NO_LAW = "The data hold no signal, so no law was identified"
