@@ -47,7 +47,7 @@ def structure():
     return Structure((law,), (), 8)
 
 
-TWIN = Twin(LAW, "series", True, Difference(0.0, 0.0, 0.2), order=8)
+TWIN = Twin(LAW, "series", True, Difference(0.0, 0.0, 0.2))
 
 
 @pytest.mark.parametrize(

@@ -188,8 +188,5 @@ def structure_of(
 ) -> identify.Structure:
     """Return what the flows of these runs determine, at the known part and at the law found."""
     found = LawTerms.of(terms)
-    return identify.analyse_structure(
-        runs, library, base=model.law, nominal={FOUND: found} if found.coefficients else {},
-        modulus=model.modulus, relaxation_time=model.relaxation_time,
-        solvent_viscosity=model.solvent_viscosity, use_normal_stresses=use_normal_stresses,
-    )  # fmt: skip
+    nominal = {FOUND: found} if found.coefficients else {}
+    return identify.analyse_structure(runs, library, model.fluid, nominal, use_normal_stresses)

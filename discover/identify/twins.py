@@ -42,8 +42,8 @@ INVISIBLE_SIZE = 0.05
 class Twin(NotebookView):
     """Law that no shear stress distinguishes from another.
 
-    `proof`: ``"relation"`` or ``"series"`` are exact, ``"histories"`` to integration error.
-    `order`: of a proof by series, at coefficients rounded to short fractions.
+    `proof`: ``"relation"`` is exact, ``"series"`` too, at coefficients rounded to short fractions,
+    ``"histories"`` to integration error.
     """
 
     law: LawTerms  # the twin, beyond the known part
@@ -52,7 +52,6 @@ class Twin(NotebookView):
     difference: side_by_side.Difference  # largest difference of σ12, N1 and N2 in random histories
     # experiments that would tell the two apart
     separated_by: tuple[side_by_side.Separation, ...] = ()
-    order: int | None = None
 
     @property
     def text(self) -> str:
@@ -60,7 +59,7 @@ class Twin(NotebookView):
         same = "the same σ12 and the same N1" if self.keeps_N1 else "the same σ12"
         how = {
             "relation": "an identity between tensors in shear",
-            "series": f"Taylor series equal to order {self.order} in exact arithmetic",
+            "series": f"Taylor series equal to order {DEFAULT_ORDER} in exact arithmetic",
             "histories": "to integration error in random histories",
         }[self.proof]
         text = (
@@ -109,12 +108,11 @@ def find_twins(
     if isinstance(base, UpperConvectedMaxwell):
         found += _by_series(library, law, base.linear_relaxation)
         found += _by_relations(library, law)
-    distinct = {_key(law): None}
-    unique = []
+    distinct: dict[tuple, _Candidate] = {}
     for one in found:
-        if _key(one[0]) not in distinct:
-            distinct[_key(one[0])] = None
-            unique.append(one)
+        distinct.setdefault(_key(one[0]), one)
+    distinct.pop(_key(law), None)
+    unique = list(distinct.values())
     if not unique:
         return []
     laws = [law, *(one[0] for one in unique)]
@@ -133,7 +131,6 @@ def find_twins(
             keeps_N1=d.N1 <= 10.0 * side_by_side.SAME,
             difference=d,
             separated_by=by,
-            order=DEFAULT_ORDER if proof == "series" else None,
         )
         for ((twin, proof), d), by in zip(kept, told, strict=True)
     ]
