@@ -1,7 +1,6 @@
 """Views of results that are constants with intervals: table, intervals, figure."""
 
 import html
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -23,23 +22,6 @@ class NotebookView:
 
     def _repr_html_(self) -> str:
         return "".join(map(as_html, self._shown()))
-
-
-class SentenceAndTable(NotebookView, ABC):
-    """A result that one sentence sums up and a table lays out."""
-
-    @property
-    @abstractmethod
-    def text(self) -> str:
-        """One sentence for a reader."""
-
-    @abstractmethod
-    def table(self) -> pd.DataFrame:
-        """Return what it consists of, one line each."""
-
-    def _shown(self) -> Iterable[Any]:
-        yield self.text
-        yield self.table()
 
 
 def as_html(part: Any) -> str:

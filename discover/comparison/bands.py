@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.flows import MEASURED, Flow, columns_of
+from discover.comparison.flows import MEASURED, Flow, Stresses, columns_of
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
-from discover.forward import make_batch
+from discover.forward import AugmentedModel, make_batch
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
@@ -132,6 +132,32 @@ def run_of(flow: Flow) -> Run:
     nothing = np.zeros(len(flow.times))
     strain = nothing if flow.records_strain else None
     return Run(flow.name, flow.times, flow.protocol, flow.rate, nothing, strain=strain)
+
+
+def in_flows(
+    model: AugmentedModel,
+    thetas: Sequence[Float[np.ndarray, " p"]],
+    flows: Sequence[Flow],
+    runs: Sequence[Run] | None = None,
+) -> list[dict[str, Stresses | None]]:
+    """Return what vectors of constants predict in each flow, by its key; None where they diverge.
+
+    `runs`: that the flows ask for; by default of the fluid alone.
+    """
+    if not flows:
+        return [{} for _ in thetas]
+    runs = list(map(run_of, flows)) if runs is None else runs
+    with np.errstate(all="ignore"):
+        predicted = model.observables(thetas, make_batch(runs))
+    return [
+        {
+            flow.key: columns_of(rows[: len(flow.times)])
+            if np.all(np.isfinite(rows[: len(flow.times), 0]))
+            else None
+            for flow, rows in zip(flows, of_one, strict=True)
+        }
+        for of_one in predicted
+    ]
 
 
 def _bands(

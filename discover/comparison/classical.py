@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.comparison.flows import Flow, columns_of, of_recorded, relative_errors
+from discover.comparison.bands import in_flows
+from discover.comparison.flows import Flow, of_recorded, relative_errors
 from discover.comparison.known_part import Frame
 from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
-from discover.forward import DeclaredModel, make_batch
+from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.laws import LAWS
 from discover.loop.answering import LAW_OF_EFFECT
@@ -143,23 +144,9 @@ def _result(
         values[constant], ends[constant] = float(fit.theta[at]), fit.interval(at)
     off = (rows.recorded - fitter.record(fit)) / rows.size
     misfit = float(np.mean(rows.rms_by_run(off)))
+    (predicted,) = in_flows(model, [fit.theta], judged)
     return ClassicalFit(
         name, values, ends, misfit, float(-2.0 * fit.log_evidence - least),
-        _errors(fitter, fit, judged),
+        {flow.name: of_recorded(relative_errors(predicted[flow.key], flow.reference), flow)
+         for flow in judged},
     )  # fmt: skip
-
-
-def _errors(fitter: Fitter, fit: Fit, judged: Sequence[Flow]) -> dict:
-    from discover.comparison.bands import run_of
-
-    if not judged:
-        return {}
-    batch = make_batch([run_of(flow) for flow in judged])
-    with np.errstate(all="ignore"):
-        predicted = fitter.problem.model.observables([fit.theta], batch)[0]
-    errors = {}
-    for flow, rows in zip(judged, predicted, strict=True):
-        values = rows[: len(flow.times)]
-        told = columns_of(values) if np.all(np.isfinite(values[:, 0])) else None
-        errors[flow.name] = of_recorded(relative_errors(told, flow.reference), flow)
-    return errors

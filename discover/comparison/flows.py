@@ -14,12 +14,13 @@ from discover.dataset.records.thinning import thin_run, without_held_values, wit
 from discover.dataset.run import Run, sizes_of
 from discover.equations import law_terms
 from discover.errors import InputError
+from discover.forward.of_fluids import recorded_and_normal
 from discover.laws import Fluid, make_law
 from discover.learners.runs import waiting
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
-from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
+from discover.simulate.solve import SimulationError, observe
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
 from discover.study.declared_model import StudyModel
@@ -209,7 +210,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
     dataset = data.dataset
     exact = dataset.exact if isinstance(dataset, SyntheticDataset) else None
     if exact is not None:
-        reference = stresses(exact[run.name], run.protocol)
+        reference = columns_of(recorded_and_normal(run.protocol, exact[run.name].components))
     else:
         candidates = {
             "sigma12": run.recorded,  # in extension the tensile stress, in creep the strain
@@ -227,18 +228,12 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
 
 
 def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
-    rates = protocols.shear_rates(protocol, times)
+    rates, reference = protocols.shear_rates(protocol, times), observe(truth, protocol, times)
     return Flow(
-        name, kind, protocol, times, rates, _exactly(truth, protocol, times), is_truth=True,
+        name, kind, protocol, times, rates, columns_of(reference), is_truth=True,
         training_end=TRAINING_DURATION if kind == "test" else None,
         oscillatory=_oscillates(protocol, rates),
     )  # fmt: skip
-
-
-def _exactly(
-    truth: Fluid, protocol: protocols.FlowProtocol, times: np.ndarray
-) -> dict[str, np.ndarray]:
-    return stresses(simulate(truth, protocol, times), protocol)
 
 
 def _oscillates(protocol: protocols.FlowProtocol, rates: np.ndarray) -> bool:
@@ -259,15 +254,6 @@ def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
         return columns_of(observe(fluid, flow.protocol, flow.times))
     except SimulationError:
         return None
-
-
-def stresses(stress: ShearStress, protocol: protocols.FlowProtocol) -> dict[str, np.ndarray]:
-    """Return the compared quantities of a solution; in extension the tensile stress comes first."""
-    return {
-        "sigma12": protocols.recorded_at(protocol, stress.components),
-        "N1": stress.first_normal_stress_difference,
-        "N2": stress.second_normal_stress_difference,
-    }
 
 
 def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[str, float | None]:

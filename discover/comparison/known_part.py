@@ -65,7 +65,7 @@ class Frame:
 
     def alone(self) -> dict[str, Stresses | None]:
         """Return what the known part alone predicts, by the key of the flow."""
-        found = simulated(self.model.fluid, self.flows).predictions
+        found, _ = simulated(self.model.fluid, self.flows)
         return {flow.key: self.recorded(flow, found[flow.key]) for flow in self.flows}
 
 

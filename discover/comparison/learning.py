@@ -112,9 +112,9 @@ class Learning:
             result, fluid = train(
                 learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
             )
-        found = simulated(fluid, flows)
-        outcome = LearnerOutcome.of(result, fluid, flows, found.predictions)
-        outcome = replace(outcome, physics=physics_of(found, flows))
+        predictions, seen = simulated(fluid, flows)
+        outcome = LearnerOutcome.of(result, fluid, flows, predictions)
+        outcome = replace(outcome, physics=physics_of(seen, flows))
         if store is not None:
             store.save(learner, outcome.to_state())
             # the same route as after an interruption, so that both give the same files

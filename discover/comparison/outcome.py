@@ -16,7 +16,6 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.results import TermTables
 from discover.plain_numbers import plain
 from discover.protocols.between_samples import sampling_interval
-from discover.protocols.kinematics import FOLLOWED
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
@@ -99,7 +98,7 @@ def _bands(
     if len(result.members) < 2:
         return {}
     others = [replace(fluid, law=law) for law in result.members if law is not result.law]
-    members = [own, *(simulated(member, flows).predictions for member in others)]
+    members = [own, *(simulated(member, flows)[0] for member in others)]
     bands: dict[str, Limits | None] = {}
     for flow in flows:
         if flow.kind not in DRAWN:
@@ -227,7 +226,7 @@ def _lack_of_fit(
     expectation: Expectation,
     normal_stresses_used: bool,
 ) -> LackOfFit:
-    residuals, records, rates, even, intervals = [], [], [], [], []
+    residuals, records, even, intervals = [], [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
         for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
@@ -242,32 +241,19 @@ def _lack_of_fit(
             residuals.append(prediction[quantity] - record)
             records.append(record)
             even.append(flow.even(record))
-            rates.append(np.asarray(flow.rate, dtype=float))
             intervals.append(sampling_interval(flow.times, flow.protocol, quantity))
-    # moduli that are constant are those of a linear fluid, and of no dead sensor
-    imposed = rates if all(flow.protocol.control in FOLLOWED for flow in training) else None
-    return lack_of_fit(residuals, records, expectation, imposed, even, intervals)
+    return lack_of_fit(residuals, records, expectation, even, intervals)
 
 
 _PHYSICS_FLOWS = ("training", "held_out", "test")
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """What a fluid does in flows.
+def simulated(
+    fluid: Fluid, flows: Sequence[Flow]
+) -> tuple[dict[str, Stresses | None], identify.Seen]:
+    """Return what a fluid does in flows, by key, and what the checks of its physics are made of.
 
-    `predictions`: by the key of the flow; None where the law diverges. `seen`: what the checks of
-    its physics are made of.
-    """
-
-    predictions: Mapping[str, Stresses | None]
-    seen: identify.Seen
-
-
-def simulated(fluid: Fluid, flows: Sequence[Flow]) -> Simulated:
-    """Return what a fluid does in flows.
-
-    Training flows set the box beyond which the law extrapolates.
+    None where the law diverges. Training flows set the box beyond which the law extrapolates.
     """
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along
@@ -278,15 +264,13 @@ def simulated(fluid: Fluid, flows: Sequence[Flow]) -> Simulated:
     # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
     seen = identify.see(fluid, protocols, times, weissenberg, max(deborah, weissenberg / 5.0))
     pairs = zip(flows, seen.along.observed, strict=True)
-    return Simulated(
-        {flow.key: columns_of(o) if np.all(np.isfinite(o)) else None for flow, o in pairs}, seen
-    )
+    return {f.key: columns_of(o) if np.all(np.isfinite(o)) else None for f, o in pairs}, seen
 
 
-def physics_of(found: Simulated, flows: Sequence[Flow]) -> dict[str, Any]:
+def physics_of(seen: identify.Seen, flows: Sequence[Flow]) -> dict[str, Any]:
     """Return checks of a fluid's physical soundness along the flows, as JSON-able values."""
     names = {i: flow.title for i, flow in enumerate(flows) if flow.kind in _PHYSICS_FLOWS}
-    return identify.check_physics(found.seen, names).to_json()
+    return identify.check_physics(seen, names).to_json()
 
 
 def _frequency(flow: Flow) -> float:

@@ -4,14 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from discover import identify
-from discover.comparison.bands import flow_run
+from discover.comparison.bands import flow_run, in_flows
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
 from discover.comparison.hypotheses import terms_of
 from discover.dataset.run import Run
-from discover.forward import make_batch
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.loop.loop import Found
@@ -110,16 +107,8 @@ def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, R
         return []
     best, own = fits[0][0], terms_of(fits[0][0], found)
     asked = [flow_run(flow, found, runs) for flow in flows]
-    with np.errstate(all="ignore"):
-        thetas = [best.theta, *(fit.theta for fit, _, _ in named)]
-        predicted = found.posterior.problem.model.observables(thetas, make_batch(asked))
-    told = [
-        {
-            flow.key: dict(zip(QUANTITIES, rows[: len(flow.times)].T, strict=True))
-            for flow, rows in zip(flows, law, strict=True)
-        }
-        for law in predicted
-    ]
+    thetas = [best.theta, *(fit.theta for fit, _, _ in named)]
+    told = in_flows(found.posterior.problem.model, thetas, flows, asked)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind != "training"]
     rivals = []
@@ -199,8 +188,5 @@ def structure_of(
 ) -> identify.Structure:
     """Return what the flows of these runs determine, at the known part and at the law found."""
     found = LawTerms.of(terms)
-    return identify.analyse_structure(
-        runs, library, base=model.law, nominal={FOUND: found} if found.coefficients else {},
-        modulus=model.modulus, relaxation_time=model.relaxation_time,
-        solvent_viscosity=model.solvent_viscosity, use_normal_stresses=use_normal_stresses,
-    )  # fmt: skip
+    nominal = {FOUND: found} if found.coefficients else {}
+    return identify.analyse_structure(runs, library, model.fluid, nominal, use_normal_stresses)

@@ -23,7 +23,7 @@ from discover.comparison.flows import (
 from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, study_library
-from discover.comparison.outcome import LearnerOutcome, expectation_of, lacks_of_fit
+from discover.comparison.outcome import expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
@@ -33,7 +33,7 @@ from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
-from discover.loop.search_time import ComparisonTime
+from discover.loop.search_progress import ComparisonProgress
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
 from discover.progress import Progress, silent
@@ -67,7 +67,9 @@ def data_in_words(data: StudyData, study: Study) -> str:
 
 def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
     """Return what was known before, and what was fitted with the likeliest hypothesis."""
-    text = _law_and_modes(frame.model, study)
+    text = f"{frame.model.described}, {frame.model.modes_in_words}"
+    if not study.model.known_relaxation:
+        text = "upper convected Maxwell without its relaxation term (a purely elastic solid)"
     if declared.free_constants:
         text += f" ({', '.join(declared.free_constants)} fitted)"
     if frame.effects:
@@ -76,17 +78,8 @@ def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 
 
-def _law_and_modes(model: StudyModel, study: Study) -> str:
-    if not study.model.known_relaxation:
-        return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
-    named = LAWS.get(model.law_name)
-    title = model.law_name if named is None else named.described(model.parameters)
-    modes = len(model.modulus)
-    source = " from the linear sweep" if study.model.from_ is None else ""
-    text = title if modes == 1 else f"{title}, {modes} relaxation modes{source}"
-    if model.solvent_viscosity:
-        text += f", a solvent of {model.solvent_viscosity:.4g} Pa s"
-    return f"{text}; {model.solid.rstrip('.')}" if model.solid else text
+_NO_LAW = "The data hold no signal, so no law was identified"
+_NO_FLUID = "noise and the instrument alone, without a fluid, are as likely"
 
 
 @in_one_thread
@@ -126,23 +119,28 @@ def compare(
         if simple is not None:
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
-    several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
-    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
+    done = ComparisonProgress(progress, MOST_EFFECTS, len(declared.modulus) > 1)
     progress("searching among laws, effects and terms", 0.0)
-    found = search_hypotheses(study, data, declared, library, times.searching)
+    found = search_hypotheses(study, data, declared, library, done.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
-    times.learning()
 
-    own = learning.outcomes(options.learners, frame, times.learned)
-    times.weighing("weighing what was found")
+    own = learning.outcomes(options.learners, frame, done.learned)
+    done.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
     found = found.with_curves()
-    silent_ = found.ended().verdict == "no_signal"
-    outcomes = {
-        name: _told(replace(one, terms=proposed[name].terms), silent_)
-        for name, one in outcomes.items()
-    }
+    outcomes = {name: replace(one, terms=proposed[name].terms) for name, one in outcomes.items()}
+    left = lacks_of_fit(
+        outcomes, frame.flows, expectation_of(study, declared, data), options.use_normal_stresses
+    )
+    if found.ended().verdict == "no_signal":
+        outcomes = {
+            name: replace(one, terms=(), message=_NO_LAW, details={})
+            for name, one in outcomes.items()
+        }
+        left = {
+            name: replace(one, verdict="no_signal", reason=_NO_FLUID) for name, one in left.items()
+        }
     comparison = Comparison(
         name=study.name,
         data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
@@ -152,10 +150,7 @@ def compare(
         outcomes=outcomes,
         posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
-        lack_of_fit=lacks_of_fit(
-            outcomes, frame.flows, expectation_of(study, declared, data),
-            options.use_normal_stresses,
-        ),
+        lack_of_fit=left,
         truth=_truth(study, declared),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
         seed=learning.seed,
@@ -199,14 +194,6 @@ def _of_material(
             data.dataset, study.data.material, data.dataset.name
         ),
     )  # fmt: skip
-
-
-def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
-    """Return an outcome without terms where the data hold no signal."""
-    if not is_silent:
-        return outcome
-    message = "The data hold no signal, so no law was identified"
-    return replace(outcome, terms=(), message=message, details={})
 
 
 def _with_what_is_open(

@@ -152,7 +152,7 @@ def _what_is_left(
     left = [one.residual[0] for one in records if not one.held_out]
     even = [1.0 / run.sizes(run.recorded) for run in fitted]
     intervals = [sampling_interval(run.time, run.protocol, run.quantity) for run in fitted]
-    return lack_of_fit(left, [run.recorded for run in fitted], expectation, None, even, intervals)
+    return lack_of_fit(left, [run.recorded for run in fitted], expectation, even, intervals)
 
 
 def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import count, islice
+from itertools import count, islice, pairwise
 from typing import Any, no_type_check
 
 import numpy as np
@@ -288,10 +288,14 @@ def shear_at(
 
 def _interpolate(samples: Sequence[Fraction]) -> list[Fraction]:
     """Return the polynomial with these values at 0, 1, 2, ..., constant first."""
-    n = len(samples)
-    rows = [[Fraction(x) ** power for power in range(n)] for x in range(n)]
-    polynomial = _solve_exactly(rows, samples)
-    assert polynomial is not None  # a Vandermonde matrix is regular
+    differences, binomial = list(samples), [Fraction(1)]  # Newton's, times x over k
+    polynomial = [Fraction(0)] * len(samples)
+    for k in range(len(samples)):
+        for power, value in enumerate(binomial):
+            polynomial[power] += differences[0] * value
+        differences = [later - value for value, later in pairwise(differences)]
+        shifted = zip([0, *binomial], [*binomial, 0], strict=True)
+        binomial = [(lower - k * value) / Fraction(k + 1) for lower, value in shifted]
     while polynomial and polynomial[-1] == 0:
         polynomial.pop()
     return polynomial
@@ -306,64 +310,3 @@ def _real_roots(polynomial: Sequence[Fraction]) -> list[float]:
     roots = np.roots([float(value) for value in reversed(polynomial)])
     real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
     return sorted(real, key=abs)
-
-
-def hidden_change(
-    first: Mapping[str, Fraction | int],
-    second: Mapping[str, Fraction | int],
-    order: int = DEFAULT_ORDER,
-    linear_relaxation: bool = True,
-) -> dict[str, str]:
-    """Return the second law's normal stresses as linear functions of the first's, in words.
-
-    Solved exactly over two random histories; empty if there is none. Where the first law confines
-    its stresses, the change with the fewest terms is one of several.
-    """
-    generator = random.Random(4)
-    states: list[tuple[Fraction, ...]] = []
-    images: list[tuple[Fraction, ...]] = []
-    for _ in range(_HISTORIES):
-        rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
-        states += stress_series(first, rate, order, linear_relaxation)
-        images += stress_series(second, rate, order, linear_relaxation)
-    change = {}
-    for row, name in enumerate(_NORMAL):
-        solved = _solve_exactly([s[:3] for s in states], [image[row] for image in images])
-        if solved is None:
-            return {}
-        parts = [
-            f"{value} {source}" for value, source in zip(solved, _NORMAL, strict=True) if value
-        ]
-        change[name] = " + ".join(parts) or "0"
-    return change
-
-
-_NORMAL = ("sigma11", "sigma22", "sigma33")
-
-
-def _solve_exactly(
-    matrix: Sequence[Sequence[Fraction]], right: Sequence[Fraction]
-) -> list[Fraction] | None:
-    """Return x with matrix x = right, free unknowns zero, or None."""
-    n = len(matrix[0])
-    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
-    solution, used = [Fraction(0)] * n, 0
-    pivots = []
-    for column in range(n):
-        pivot = next((i for i in range(used, len(rows)) if rows[i][column]), None)
-        if pivot is None:
-            continue
-        rows[used], rows[pivot] = rows[pivot], rows[used]
-        lead = rows[used][column]
-        rows[used] = [value / lead for value in rows[used]]
-        for i, row in enumerate(rows):
-            if i != used and row[column]:
-                factor = row[column]
-                rows[i] = [a - factor * b for a, b in zip(row, rows[used], strict=True)]
-        pivots.append(column)
-        used += 1
-    if any(row[n] for row in rows[used:]):
-        return None
-    for i, column in enumerate(pivots):
-        solution[column] = rows[i][n]
-    return solution

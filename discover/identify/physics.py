@@ -5,15 +5,16 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float
 
+from discover.forward.of_fluids import observed_in
 from discover.identify import physics_flows
 from discover.laws import Fluid
-from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
+from discover.protocols import in_flow, steady_rates
+from discover.protocols.kinematics import FlowKind
 from discover.protocols.protocol import FlowProtocol
-from discover.summary_view import SentenceAndTable, table_of
+from discover.simulate.synthetic import at_rest, modulus_at_rest
 from discover.words import percent_of, plainly
 
 _ROUNDING = 1e-6
@@ -47,13 +48,9 @@ class PhysicsCheck:
     where: str  # where it is taken, or where the law fails, in words
     text: str  # one sentence for a reader
 
-    def line(self) -> dict[str, Any]:
-        """Return the check as one line of a table."""
-        return {"check": self.name, "passed": self.passed, "value": self.value, "text": self.text}
-
 
 @dataclass(frozen=True)
-class PhysicsReport(SentenceAndTable):
+class PhysicsReport:
     """All checks of a law."""
 
     checks: tuple[PhysicsCheck, ...]  # in a fixed order
@@ -68,10 +65,6 @@ class PhysicsReport(SentenceAndTable):
         if not failed:
             return "The law passes every check of physical soundness that could be made."
         return "The law fails: " + ", ".join(failed) + "."
-
-    def table(self) -> pd.DataFrame:
-        """Return the checks, one line each."""
-        return table_of(self.checks)
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as ``comparison.json`` holds it."""
@@ -126,19 +119,13 @@ def check_physics(seen: Seen, names: Mapping[int, str]) -> PhysicsReport:
         # creep and sweeps tell of no mode: cycles at the rate of training do
         titles = list(seen.beyond.names[:_PER_RATE])
         along = seen.in_cycles.some(range(_PER_RATE))
-    times = np.asarray(fluid.relaxation_time)
-    rates = SHEAR_RATES / physics_flows.time_scale(fluid)
-    shear = [
-        physics_flows.steady_branch(law_of_mode(fluid.law, number), physics_flows.SHEAR, own)
-        for number, own in enumerate(np.outer(times, rates))
-    ]
     found = {
         "conformation tensor positive definite": _conformation(along, titles),
         "dissipation non-negative": _free_energy(along, titles),
         "work over a cycle non-negative": _work(seen),
-        "flow curve monotonic": _flow_curve(fluid, shear, rates, seen.weissenberg),
+        "flow curve monotonic": _flow_curve(fluid, seen.weissenberg),
         "steady extension bounded": _extension(fluid),
-        SMALL_STRAIN: _small_strain(shear),
+        SMALL_STRAIN: _small_strain(fluid),
         "integrates beyond training": _reach(seen),
     }
     return PhysicsReport(tuple(PhysicsCheck(name, *one) for name, one in found.items()))
@@ -185,18 +172,18 @@ def _work(seen: Seen) -> _Found:
     return bool(value >= -_ROUNDING), float(value), where, text
 
 
-def _flow_curve(
-    fluid: Fluid,
-    shear: Sequence[physics_flows.Branch],
-    rates: Float[np.ndarray, " n"],
-    weissenberg: float,
-) -> _Found:
+def _steady(fluid: Fluid, kind: FlowKind, rates: Float[np.ndarray, " n"]) -> tuple[np.ndarray, int]:
+    """Return the stress of steady flow in Pa, and up to which rate in 1/s there is such a state."""
+    flow = in_flow(steady_rates(rates), kind)
+    stress = observed_in(fluid, flow, np.arange(1.0, rates.size + 1.0))[:, 0]
+    steady = np.isfinite(stress)
+    return stress, rates.size if steady.all() else int(np.argmin(steady))
+
+
+def _flow_curve(fluid: Fluid, weissenberg: float) -> _Found:
     slowest = physics_flows.time_scale(fluid)
-    modes = zip(np.asarray(fluid.modulus), shear, strict=True)
-    stress = sum(modulus * branch.stress[:, 3] for modulus, branch in modes)
-    stress = stress + np.asarray(fluid.solvent_viscosity) * rates
-    steady = np.all([branch.is_steady for branch in shear], axis=0)
-    last = rates.size if steady.all() else int(np.argmin(steady))
+    rates = SHEAR_RATES / slowest
+    stress, last = _steady(fluid, "shear", rates)
     falling = np.flatnonzero(np.diff(stress[:last]) <= 0.0)
     if falling.size:
         low, high = float(rates[falling[0]]), float(rates[falling[-1] + 1])
@@ -219,18 +206,14 @@ def _flow_curve(
 
 def _extension(fluid: Fluid) -> _Found:
     longest = float(np.max(np.asarray(fluid.relaxation_time)))
-    reached = _last_stable(fluid, EXTENSION_RATES)
-    if reached == EXTENSION_RATES.size:
-        where = f"extension rates up to {plainly(EXTENSION_RATES[-1] / longest)} 1/s"
+    rates = EXTENSION_RATES / longest
+    _, reached = _steady(fluid, "uniaxial", rates)
+    if reached == rates.size:
+        where = f"extension rates up to {plainly(rates[-1])} 1/s"
         text = f"The stress in uniaxial extension settles at all {where}."
-        return True, float(EXTENSION_RATES[-1] / longest), where, text
-    low = EXTENSION_RATES[max(reached - 1, 0)]
-    high = EXTENSION_RATES[reached]
-    # from rest again, but finely across the last step
-    fine = np.concatenate(
-        [EXTENSION_RATES[: max(reached - 1, 0)], np.linspace(low, high, _REFINED)]
-    )
-    limit = float(fine[max(_last_stable(fluid, fine) - 1, 0)] / longest)
+        return True, float(rates[-1]), where, text
+    fine = np.linspace(rates[max(reached - 1, 0)], rates[reached], _REFINED)
+    limit = float(fine[max(_steady(fluid, "uniaxial", fine)[1] - 1, 0)])
     text = (
         f"In uniaxial extension at rates beyond {limit:.4g} 1/s ({limit * longest:.3g} over the "
         "longest relaxation time) no steady state is stable: the stress grows without bound."
@@ -238,34 +221,13 @@ def _extension(fluid: Fluid) -> _Found:
     return False, limit, f"extension rates beyond {limit:.4g} 1/s", text
 
 
-def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
-    times = np.asarray(fluid.relaxation_time)
-    slowest = int(np.argmax(times))
-    # of one law for all modes the slowest gives way first
-    numbers = range(len(times)) if differs_by_mode(fluid.law) else [slowest]
-    good = np.ones(rates.size, dtype=bool)
-    for number in numbers:
-        scaled = rates * (times[number] / times[slowest])
-        law = law_of_mode(fluid.law, number)
-        branch = physics_flows.steady_branch(law, physics_flows.UNIAXIAL, scaled)
-        good &= branch.is_steady & branch.is_stable
-    return rates.size if good.all() else int(np.argmin(good))
-
-
-def _off_at_rest(branch: physics_flows.Branch) -> tuple[float, float]:
-    """Return dσ/dt at rest, and by how much G′ + iG″ is off that of a Maxwell mode."""
-    frequency, one = np.geomspace(0.01, 100.0, 41), np.eye(len(branch.source))
-    source = branch.source.astype(complex)
-    response = np.array(
-        [1j * w * np.linalg.solve(1j * w * one - branch.relaxation, source)[3] for w in frequency]
-    )
+def _small_strain(fluid: Fluid) -> _Found:
+    drift, *linear = at_rest(fluid.law, fluid.n_modes)
+    frequency = np.geomspace(0.01, 100.0, 41)
     maxwell = 1j * frequency / (1.0 + 1j * frequency)
-    off = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
-    return float(np.max(np.abs(branch.drift))), off
-
-
-def _small_strain(shear: Sequence[physics_flows.Branch]) -> _Found:
-    offset, value = (max(column) for column in zip(*map(_off_at_rest, shear), strict=True))
+    moduli = np.array([modulus_at_rest(*mode, frequency) for mode in zip(*linear, strict=True)])
+    value = float(np.max(np.abs(moduli - maxwell) / np.abs(maxwell)))
+    offset = float(np.max(np.abs(drift)))
     text = (
         f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
         f"{percent_of(max(value, 1e-5))} (the law linearised at rest, frequencies times "

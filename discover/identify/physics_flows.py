@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from discover.equations.equation import mean_relaxation_time
 from discover.forward import make_batch
@@ -21,7 +21,7 @@ from discover.forward.of_fluids import (
     recorded_and_normal,
     velocity_gradients,
 )
-from discover.laws import AbstractConstitutiveLaw, Fluid
+from discover.laws import Fluid
 from discover.laws.each_mode import over_modes
 from discover.laws.expansion import in_shared_form
 from discover.programs import compiled, on_device
@@ -203,90 +203,3 @@ def cycles(scale: float, weissenberg: Sequence[float], deborah: Sequence[float])
         tuple(oscillatory_shear(wi / scale, de / scale) for wi, de in pairs),
         tuple(samples * scale / de for _, de in pairs),
     )
-
-
-_NEWTON_STEPS = 25
-_CONVERGED = 1e-9
-
-SHEAR = np.array([0.0, 0.0, 0.0, 1.0])
-"""Velocity gradient (L11, L22, L33, L12) of simple shear at unit rate."""
-
-UNIAXIAL = np.array([1.0, -0.5, -0.5, 0.0])
-"""Velocity gradient of uniaxial extension at unit rate."""
-
-_RATES = 302
-"""Rates of one branch: fewer are padded, so that every branch of a law shares one program."""
-
-
-class Branch(NamedTuple):
-    """Steady states of a law along rising rates, each from the one before, the first from rest.
-
-    The branch that a slow rise of the rate follows. `stress`: (11, 22, 33, 12) with the structure
-    variables behind, dimensionless. `jacobian`: ∂(dσ/dt)/∂σ; in extension of σ11, σ22 = σ33 and the
-    variables. `residual`: size of dσ/dt over that of the stress. `drift`, `relaxation`, `source`:
-    at rest dσ/dt, and its derivatives by the stress and by the shear rate.
-    """
-
-    stress: Float[np.ndarray, "n s"]
-    jacobian: Float[np.ndarray, "n d d"]
-    residual: Float[np.ndarray, " n"]
-    drift: Float[np.ndarray, " s"]
-    relaxation: Float[np.ndarray, "s s"]
-    source: Float[np.ndarray, " s"]
-
-    @property
-    def is_steady(self) -> Bool[np.ndarray, " n"]:
-        """Where Newton's method converged."""
-        return np.isfinite(self.residual) & (self.residual < _CONVERGED)
-
-    @property
-    def is_stable(self) -> Bool[np.ndarray, " n"]:
-        """Where every small homogeneous disturbance decays: no eigenvalue with Re ≥ 0."""
-        finite = np.all(np.isfinite(self.jacobian), axis=(1, 2))
-        safe = np.where(finite[:, None, None], self.jacobian, np.eye(self.jacobian.shape[-1]))
-        return finite & (np.max(np.linalg.eigvals(safe).real, axis=1) < 0.0)
-
-
-def steady_branch(
-    law: AbstractConstitutiveLaw, flow: Float[np.ndarray, "4"], rates: Float[np.ndarray, " n"]
-) -> Branch:
-    """Return the steady states of a law in `SHEAR` or `UNIAXIAL` flow at increasing rates.
-
-    `rates`: at most 302, times λ.
-    """
-    padded = np.pad(rates, (0, _RATES - rates.size), mode="edge")
-    in_shear = bool(flow[3])
-    # where no shear drives it σ12 is zero, and may be free to be anything: it is not solved for
-    moves = np.append([1.0, 1.0, 1.0, float(in_shear)], np.ones(law.variables))
-    given = (padded[:, None] * flow, moves)
-    stress, jacobian, residual, *at_rest = map(np.asarray, _followed(law, *map(on_device, given)))
-    if not in_shear:
-        kept = np.delete(np.arange(moves.size), [2, 3])
-        beside = jacobian[:, kept, 2]
-        jacobian = jacobian[:, kept][:, :, kept]
-        jacobian[:, :, 1] += beside
-    n = rates.size
-    return Branch(stress[:n], jacobian[:n], residual[:n], *at_rest)
-
-
-@compiled
-def _followed(law, gradients, moves):
-    def slope(state, gradient):
-        return moves * law.stress_rate(state, gradient)
-
-    def at(stress, gradient):
-        def improve(state, _):
-            matrix = jax.jacfwd(slope)(state, gradient) + jnp.diag(1.0 - moves)
-            return state - jnp.linalg.solve(matrix, slope(state, gradient)), None
-
-        found, _ = jax.lax.scan(improve, stress, None, length=_NEWTON_STEPS)
-        residual = jnp.linalg.norm(slope(found, gradient)) / (1.0 + jnp.linalg.norm(found))
-        # what did not converge does not lead the next rate astray
-        good = jnp.isfinite(residual) & (residual < _CONVERGED)
-        following = jnp.where(good, found, stress)
-        return following, (found, jax.jacfwd(slope)(found, gradient), residual)
-
-    rest, still = law.rest(), jnp.zeros(())
-    by_stress, by_rate = jax.jacfwd(law.stress_rate, argnums=(0, 1))(rest, still)
-    found = jax.lax.scan(at, rest, gradients)[1]
-    return (*found, law.stress_rate(rest, still), by_stress, by_rate)

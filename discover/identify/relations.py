@@ -80,7 +80,7 @@ def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     known: list[list[int]] = []
     for touches, components in _COMPONENTS_SEEN.items():
         rows = [[value[i] for value in at_state] for at_state in values for i in components]
-        for vector in _null_space(rows, n):
+        for vector in _null_space(rows):
             if not _is_new(vector, known):
                 continue
             known.append(vector)
@@ -104,58 +104,44 @@ def _random_state(generator: random.Random, library: TermLibrary):
     )
 
 
-def _reduced(rows: Sequence[Sequence[int]], n: int) -> tuple[list[list[int]], list[int]]:
+def _reduced(rows: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[int]]:
     """Return the reduced row echelon form modulo the prime, and its pivot columns."""
-    echelon: list[list[int]] = []
-    pivots: list[int] = []
-    idle = 0
+    n = len(rows[0])
+    echelon, pivots, idle = np.zeros((0, n), dtype=object), [], 0
     for given in rows:
-        row = [value % PRIME for value in given]
-        for pivot, old in zip(pivots, echelon, strict=True):
-            if row[pivot]:
-                factor = row[pivot]
-                row = [(a - factor * b) % PRIME for a, b in zip(row, old, strict=True)]
-        lead = next((i for i, value in enumerate(row) if value), None)
-        if lead is None:
+        row = np.array(given, dtype=object) % PRIME
+        row = (row - row[pivots] @ echelon) % PRIME
+        leads = np.flatnonzero(row)
+        if not len(leads):
             idle += 1
             if idle > _IDLE_ROWS:
                 break  # rows come from random states: the rank is reached
             continue
-        idle = 0
-        inverse = pow(row[lead], -1, PRIME)
-        row = [value * inverse % PRIME for value in row]
-        for k, old in enumerate(echelon):
-            if old[lead]:
-                factor = old[lead]
-                echelon[k] = [(a - factor * b) % PRIME for a, b in zip(old, row, strict=True)]
-        echelon.append(row)
+        idle, lead = 0, int(leads[0])
+        row = row * pow(row[lead], -1, PRIME) % PRIME
+        echelon = np.vstack([(echelon - np.outer(echelon[:, lead], row)) % PRIME, row])
         pivots.append(lead)
         if len(pivots) == n:
             break
     return echelon, pivots
 
 
-def _null_space(rows: Sequence[Sequence[int]], n: int) -> list[list[int]]:
+def _null_space(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     # columns in reverse, so that a relation is solved for the later, more complex, terms
-    flipped = [list(reversed(row)) for row in rows]
-    echelon, pivots = _reduced(flipped, n)
+    echelon, pivots = _reduced([row[::-1] for row in rows])
     vectors = []
-    for free in sorted(set(range(n)) - set(pivots)):
-        residues = [0] * n
-        residues[free] = 1
-        for pivot, row in zip(pivots, echelon, strict=True):
-            residues[pivot] = -row[free] % PRIME
-        fractions = [_rational(value) for value in reversed(residues)]
-        if any(value is None for value in fractions):
+    for free in sorted(set(range(len(rows[0]))) - set(pivots)):
+        residues = np.eye(1, len(rows[0]), free, dtype=int)[0].astype(object)
+        residues[pivots] = -echelon[:, free] % PRIME
+        exact = [part for value in residues[::-1] if (part := _rational(value)) is not None]
+        if len(exact) < len(residues):
             continue
-        exact = [value for value in fractions if value is not None]
         scale = lcm(*(value.denominator for value in exact))
-        whole = [int(value * scale) for value in exact]
-        shared = gcd(*whole)
-        last = next(value for value in reversed(whole) if value)
-        whole = [value // shared * (1 if last > 0 else -1) for value in whole]
-        if all(sum(c * v for c, v in zip(whole, row, strict=True) if c) == 0 for row in rows):
-            vectors.append(whole)
+        whole = np.array([int(value * scale) for value in exact], dtype=object)
+        last = whole[np.flatnonzero(whole)[-1]]
+        whole = whole // gcd(*whole) * (1 if last > 0 else -1)
+        if not np.any(np.array(rows, dtype=object) @ whole):
+            vectors.append(list(whole))
     return vectors
 
 
@@ -173,8 +159,7 @@ def _rational(residue: int) -> Fraction | None:
 
 
 def _is_new(vector: Sequence[int], known: Sequence[Sequence[int]]) -> bool:
-    n = len(vector)
-    return len(_reduced([*known, vector], n)[1]) > len(known)
+    return len(_reduced([*known, vector])[1]) > len(known)
 
 
 def feels_33(library: TermLibrary) -> bool:

@@ -30,12 +30,12 @@ from discover.identify.relations import (
 )
 from discover.identify.side_by_side import joint_library
 from discover.identify.twins import HiddenStresses, hidden_stresses
-from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
+from discover.laws import Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.laws.expansion import expansion_of, law_of_terms
 from discover.learners.runs import as_runs
 from discover.programs import compiled
-from discover.summary_view import NotebookView, SentenceAndTable, table_of
+from discover.summary_view import NotebookView, table_of
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 
@@ -165,7 +165,7 @@ class LawStructure(NotebookView):
 
 
 @dataclass(frozen=True)
-class Structure(SentenceAndTable):
+class Structure(NotebookView):
     """What an experiment can determine of a library, at the known part and at nominal laws."""
 
     laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
@@ -185,6 +185,10 @@ class Structure(SentenceAndTable):
         """Return how many combinations stay unseen, and the verdicts, one line for each law."""
         return table_of(self.laws)
 
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
+
     def to_json(self) -> dict[str, Any]:
         """Return the structure as ``comparison.json`` holds it."""
         return {
@@ -196,27 +200,26 @@ class Structure(SentenceAndTable):
 
 
 def analyse_structure(
-    runs: Sequence[Run], library: TermLibrary, base: AbstractConstitutiveLaw | None = None,
-    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None, modulus: Any = 1.0,
-    relaxation_time: Any = 1.0, solvent_viscosity: float = 0.0, use_normal_stresses: bool = False,
-) -> Structure:  # fmt: skip
+    runs: Sequence[Run],
+    library: TermLibrary,
+    known: Fluid | None = None,
+    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None,
+    use_normal_stresses: bool = False,
+) -> Structure:
     """Return what shear flows can determine of a library's coefficients.
 
     `runs`: their protocols and times; with `use_normal_stresses`, N1 and N2 that they hold count as
-    measured. `base`: known part; by default UCM. `nominal`: laws around which to look besides it;
-    by default those of `NOMINAL` in the library. `modulus`, `relaxation_time`, `solvent_viscosity`:
-    in Pa, s and Pa s, the first two with one value for each mode.
+    measured. `known`: known part; by default UCM with G = 1 Pa and λ = 1 s. `nominal`: laws around
+    which to look besides it; by default those of `NOMINAL` in the library.
     """
-    base = UpperConvectedMaxwell() if base is None else base
+    known = Fluid() if known is None else known
     if nominal is None:
         nominal = {k: v for k, v in NOMINAL.items() if set(v.coefficients) <= set(library.names)}
     laws = {k: v if isinstance(v, LawTerms) else LawTerms.of(v) for k, v in nominal.items()}
     library = joint_library(library, list(laws.values()))
-    modes = np.atleast_1d(modulus), np.atleast_1d(relaxation_time)
-    runs = as_runs(runs, modes[1], base.linear_relaxation)
+    runs = as_runs(runs, np.asarray(known.relaxation_time), known.law.linear_relaxation)
     total = sum(map(len, runs))
     runs = [thin_run(run, _ROWS) for run in runs]
-    known = Fluid(base, *modes, solvent_viscosity)
     flows = lay_out(
         [run.protocol for run in runs],
         [run.time for run in runs],

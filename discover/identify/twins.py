@@ -6,7 +6,7 @@ the unmeasured normal stresses, decided in exact arithmetic on the Taylor series
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -19,7 +19,7 @@ from discover.forward.fluids import dynamics_of_fluid
 from discover.forward.grid import make_grids
 from discover.forward.stepping import follow
 from discover.identify import side_by_side
-from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
+from discover.identify.exact_series import DEFAULT_ORDER, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.programs import compiled
@@ -30,7 +30,7 @@ from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 from tensor_library.law_terms import spell
 
 Proof = Literal["relation", "series", "histories"]
-_Candidate = tuple[LawTerms, Proof, dict[str, str]]
+_Candidate = tuple[LawTerms, Proof]
 
 _LARGEST_DENOMINATOR = 10**5
 _SHORT_DENOMINATOR = 100
@@ -42,20 +42,16 @@ INVISIBLE_SIZE = 0.05
 class Twin(NotebookView):
     """Law that no shear stress distinguishes from another.
 
-    `proof`: ``"relation"`` or ``"series"`` are exact, ``"histories"`` to integration error.
-    `order`: of a proof by series, at coefficients rounded to short fractions. `change`: the twin's
-    σ11, σ22, σ33 in terms of the other law's, where linear.
+    `proof`: ``"relation"`` is exact, ``"series"`` too, at coefficients rounded to short fractions,
+    ``"histories"`` to integration error.
     """
 
     law: LawTerms  # the twin, beyond the known part
     proof: Proof
     keeps_N1: bool  # whether N1 is the same too
     difference: side_by_side.Difference  # largest difference of σ12, N1 and N2 in random histories
-    separated_by: tuple[
-        side_by_side.Separation, ...
-    ] = ()  # experiments that would tell the two apart
-    order: int | None = None
-    change: Mapping[str, str] = field(default_factory=dict)
+    # experiments that would tell the two apart
+    separated_by: tuple[side_by_side.Separation, ...] = ()
 
     @property
     def text(self) -> str:
@@ -63,7 +59,7 @@ class Twin(NotebookView):
         same = "the same σ12 and the same N1" if self.keeps_N1 else "the same σ12"
         how = {
             "relation": "an identity between tensors in shear",
-            "series": f"Taylor series equal to order {self.order} in exact arithmetic",
+            "series": f"Taylor series equal to order {DEFAULT_ORDER} in exact arithmetic",
             "histories": "to integration error in random histories",
         }[self.proof]
         text = (
@@ -112,12 +108,11 @@ def find_twins(
     if isinstance(base, UpperConvectedMaxwell):
         found += _by_series(library, law, base.linear_relaxation)
         found += _by_relations(library, law)
-    distinct = {_key(law): None}
-    unique = []
+    distinct: dict[tuple, _Candidate] = {}
     for one in found:
-        if _key(one[0]) not in distinct:
-            distinct[_key(one[0])] = None
-            unique.append(one)
+        distinct.setdefault(_key(one[0]), one)
+    distinct.pop(_key(law), None)
+    unique = list(distinct.values())
     if not unique:
         return []
     laws = [law, *(one[0] for one in unique)]
@@ -136,10 +131,8 @@ def find_twins(
             keeps_N1=d.N1 <= 10.0 * side_by_side.SAME,
             difference=d,
             separated_by=by,
-            order=DEFAULT_ORDER if proof == "series" else None,
-            change=change,
         )
-        for ((twin, proof, change), d), by in zip(kept, told, strict=True)
+        for ((twin, proof), d), by in zip(kept, told, strict=True)
     ]
 
 
@@ -168,18 +161,14 @@ def _by_series(
                 continue
             near = {name: short[name] for name in rest}
             at_short = solve_for_coefficient(short, term.name, near, **settings)
-            proved = [value for value, is_proved in at_short if is_proved and value]
+            proved = any(value for value, is_proved in at_short if is_proved)
             if not any(value for value, _ in at_short):
                 continue
-            change = {}
-            if proved:
-                twin = {**near, term.name: Fraction(proved[0]).limit_denominator(10**6)}
-                change = hidden_change(short, twin, **settings)
             here = {name: exact[name] for name in rest}
             for value, _ in solve_for_coefficient(exact, term.name, here, **settings):
                 if value:
                     found = LawTerms({**{n: present[n] for n in rest}, term.name: value})
-                    yield found, "series" if proved else "histories", change
+                    yield found, "series" if proved else "histories"
 
 
 def _fraction(value: float, largest_denominator: int) -> Fraction:
@@ -195,7 +184,7 @@ def _by_relations(library: TermLibrary, law: LawTerms) -> Iterator[_Candidate]:
         if relation.touches == "nothing":
             for name in shared:
                 factor = -present[name] / relation.coefficients[name]
-                yield _added(law, relation.coefficients, factor), "relation", {}
+                yield _added(law, relation.coefficients, factor), "relation"
             continue
         if hidden_33 is None:
             names = list(present) or ["sigma"]
@@ -204,10 +193,10 @@ def _by_relations(library: TermLibrary, law: LawTerms) -> Iterator[_Candidate]:
             # exchanging a term of the law keeps the law small; adding the whole shows the freedom
             for name in shared:
                 factor = -present[name] / relation.coefficients[name]
-                yield _added(law, relation.coefficients, factor), "relation", {}
+                yield _added(law, relation.coefficients, factor), "relation"
             added = _added(law, relation.coefficients, INVISIBLE_SIZE)
             if not feels_33(TermLibrary(tuple(parse_term(n) for n in added.coefficients))):
-                yield added, "relation", {}
+                yield added, "relation"
 
 
 def _added(law: LawTerms, relation: Mapping[str, int], factor: float) -> LawTerms:

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Complex, Float
 
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.errors import InputError
+from discover.laws import AbstractConstitutiveLaw
 from discover.laws.each_mode import of_each_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
@@ -132,25 +134,37 @@ def linear_sweep(fluid: Fluid) -> LinearSweep:
     """
     times = np.asarray(fluid.relaxation_time)
     omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
-    of_modes = _at_rest(fluid.law, fluid.n_modes)
-    decays, every_drive = (np.asarray(part) for part in of_modes)
-    modulus = np.zeros(len(omega), dtype=complex)
-    modes = zip(np.asarray(fluid.modulus), times, decays, every_drive, strict=True)
-    for size, time, decay, drive in modes:
-        # iωλ s = A s + b λγ̇, so that G* = iωλ s12/(λγ̇) of a mode with G = 1
-        left = 1j * time * omega[:, None, None] * np.eye(len(drive)) - decay
-        drives = np.broadcast_to(drive[:, None], (len(omega), len(drive), 1))
-        stress = np.linalg.solve(left, drives)[:, 3, 0]
-        modulus += size * 1j * time * omega * stress
-    modulus += 1j * omega * float(fluid.solvent_viscosity)
+    _, *linear = at_rest(fluid.law, fluid.n_modes)
+    modulus = 1j * omega * float(fluid.solvent_viscosity)
+    for size, time, *mode in zip(np.asarray(fluid.modulus), times, *linear, strict=True):
+        modulus += size * modulus_at_rest(*mode, time * omega)
     return LinearSweep(omega, np.real(modulus), np.imag(modulus))
+
+
+def at_rest(law: AbstractConstitutiveLaw, count: int) -> list[np.ndarray]:
+    """Return dσ/dt of so many modes at rest, and its derivatives by the state and the shear rate.
+
+    Dimensionless, shapes (count, s), (count, s, s), (count, s).
+    """
+    return list(map(np.asarray, _at_rest(law, count)))
+
+
+def modulus_at_rest(
+    decay: Float[np.ndarray, "s s"],
+    drive: Float[np.ndarray, " s"],
+    frequency: Float[np.ndarray, " n"],
+) -> Complex[np.ndarray, " n"]:
+    """Return G*/G of one mode at vanishing strain. `frequency`: times λ. Else as of `at_rest`."""
+    # iωλ s = A s + b λγ̇, so that G* = iωλ s12/(λγ̇) of a mode with G = 1
+    left = 1j * frequency[:, None, None] * np.eye(len(drive)) - decay
+    drives = np.broadcast_to(drive[:, None], (len(frequency), len(drive), 1))
+    return 1j * frequency * np.linalg.solve(left, drives)[:, 3, 0]
 
 
 @compiled
 def _at_rest(law, count):
-    """Return the derivatives of the stress rate of each mode to its state and shear rate."""
-
     def of_mode(law):
-        return jax.jacfwd(law.stress_rate, argnums=(0, 1))(law.rest(), jnp.zeros(()))
+        rest, still = law.rest(), jnp.zeros(())
+        return (law.stress_rate(rest, still), *jax.jacfwd(law.stress_rate, (0, 1))(rest, still))
 
     return of_each_mode(of_mode, law, count)

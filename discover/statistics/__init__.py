@@ -2,9 +2,7 @@
 
 from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.noise.noise_model import HALF_BAND, independent_samples, root_of
-from discover.statistics.noise.outliers import holds_signal
 
 __all__ = [
-    "HALF_BAND", "FitVerdict", "LackOfFit", "holds_signal", "independent_samples", "lack_of_fit",
-    "root_of",
+    "HALF_BAND", "FitVerdict", "LackOfFit", "independent_samples", "lack_of_fit", "root_of",
 ]  # fmt: skip

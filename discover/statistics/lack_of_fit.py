@@ -1,16 +1,17 @@
 """Is what a model leaves of the records noise? One answer, for a comparison and for a loop."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.outliers import holds_signal, stray
+from discover.statistics.noise.noise_model import Rows, rms
+from discover.statistics.noise.outliers import stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
 from discover.statistics.noise.whiteness import (
+    FEWEST_FAST,
     FEWEST_TESTED,
     SIGNIFICANCE,
     noise_probability,
@@ -19,10 +20,8 @@ from discover.statistics.noise.whiteness import (
 from discover.statistics.residual import (
     STRUCTURE,
     Expectation,
-    judging,
+    lag_one_correlation,
     noise_floor,
-    summarise,
-    tells_noise,
 )
 from discover.words import percent_of
 
@@ -85,7 +84,6 @@ def lack_of_fit(
     residuals: Sequence[Float[np.ndarray, " _"]],
     measured: Sequence[Float[np.ndarray, " _"]],
     expectation: Expectation | None = None,
-    rates: Sequence[Float[np.ndarray, " _"]] | None = None,
     even: Sequence[Float[np.ndarray, " _"]] | None = None,
     intervals: Sequence[float] | None = None,
 ) -> LackOfFit:
@@ -95,55 +93,33 @@ def lack_of_fit(
 
     `residuals`: prediction minus measurement of each fitted run, in any unit. `measured`: the
     measurements, in the same unit. `expectation`: what a complete model may leave; by default noise
-    of unknown size. `rates`: what was imposed, at the samples; with them a record that never
-    follows it is told. `even`: by what records and residuals are multiplied so that their noise has
-    one size; by default by nothing.
-    """
-    factors = [np.ones(len(record)) for record in measured] if even is None else even
-    residuals, records = (
-        [factor * row for factor, row in zip(factors, rows, strict=True)]
-        for rows in (residuals, measured)
-    )
-    left = what_is_left(residuals, records, expectation, intervals)
-    if holds_signal(measured, rates):
-        return left
-    return replace(
-        left,
-        verdict="no_signal",
-        reason="the data are noise about a constant, whatever was imposed",
-    )
-
-
-def what_is_left(
-    residuals: Sequence[Float[np.ndarray, " _"]],
-    measured: Sequence[Float[np.ndarray, " _"]],
-    expectation: Expectation | None = None,
-    intervals: Sequence[float] | None = None,
-) -> LackOfFit:
-    """Return the same of records that are known to hold a signal; see `lack_of_fit`.
-
-    `residuals`, `measured`, `expectation`: as there. `intervals`: time between neighbouring samples
-    of each run, by which the correlations of their noise are held against one another
+    of unknown size. `even`: by what records and residuals are multiplied so that their noise has
+    one size; by default by nothing. `intervals`: time between neighbouring samples of each run, by
+    which the correlations of their noise are held against one another
     (`same_correlation_probability`); not a number of what is recorded otherwise. Without them they
     are not.
     """
+    if even is not None:
+        residuals, measured = (
+            [factor * row for factor, row in zip(even, rows, strict=True)]
+            for rows in (residuals, measured)
+        )
     expectation = expectation or Expectation()
-    residual, weight, record, outliers = _without_outliers(residuals, measured)
-    further = _further(residual, weight, intervals)
-    known = expectation.noise is not None or tells_noise(weight)
-    rows = judging(weight)
-    residual, weight, record = residual[rows], weight[rows], record[rows]
-    misfit = float(np.mean(np.sqrt(np.sum(residual**2, axis=1))))
-    probability = noise_probability(residual, weight, record, further)
-    floor = expectation.noise
-    floor = noise_floor(residual, weight, probability) if floor is None else floor
+    rows, records, outliers = _without_outliers(residuals, measured)
+    further = () if intervals is None else (same_correlation_probability(rows, intervals),)
+    # a run counts as much as any other: one too short to tell its noise could decide alone
+    telling = [i for i, row in enumerate(rows) if len(row) >= FEWEST_FAST]
+    if telling:
+        rows, records = ([some[i] for i in telling] for some in (rows, records))
+    misfit = float(np.mean(list(map(rms, rows))))
+    probability = noise_probability(rows, list(map(np.ones_like, rows)), records, further)
+    floor = noise_floor(rows, probability) if expectation.noise is None else expectation.noise
     expected = float(np.hypot(max(floor, expectation.repeat_error), expectation.linear_error))
-    explained = known and expectation.explains(residual, weight, probability, floor)
-    long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
-    pattern = _PATTERN if long else _PATTERN_OF_SHORT
+    known = expectation.noise is not None or bool(telling)
+    explained = known and expectation.explains(rows, probability, floor)
+    pattern = _PATTERN if max(map(len, rows)) >= FEWEST_TESTED else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"
-    summary = summarise(residual, weight)
-    correlation = float(np.mean(summary.autocorrelation))
+    correlation = float(np.mean(list(map(lag_one_correlation, rows))))
     rest = "is noise"
     if correlation >= _CORRELATED and expectation.noise is None and not expectation.repeat_error:
         rest = _IF_CORRELATED.format(correlation)
@@ -173,14 +149,6 @@ def what_is_left(
     return LackOfFit(verdict, misfit, floor, correlation, probability, outliers, reason)
 
 
-def _further(residual, weight, intervals: Sequence[float] | None) -> tuple[float, ...]:
-    """Return what tests say that need to know when the samples were taken."""
-    if intervals is None:
-        return ()
-    rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
-    return (same_correlation_probability(rows, intervals),)
-
-
 _PATTERNED = {
     (True, False): "the noise given",
     (True, True): "the noise given",
@@ -190,9 +158,9 @@ _PATTERNED = {
 """What may have a pattern, by whether the noise is given and whether runs were repeated."""
 
 
-def _without_outliers(residuals, measured):
-    """Return weighted residuals, weights and records, padded, and the number of outliers."""
-    kept, outliers = [], 0
+def _without_outliers(residuals: Rows, measured: Rows) -> tuple[Rows, Rows, int]:
+    """Return residuals over the size of each record, the records, and the number of outliers."""
+    rows, records, outliers = [], [], 0
     sizes = [rms(record) or 1.0 for record in measured]
     again = repeated([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
     for row, record in zip(residuals, measured, strict=True):
@@ -200,14 +168,7 @@ def _without_outliers(residuals, measured):
         off = stray(values, record)
         # no knock comes at the same place of several runs
         off[[at for at in again if at < len(off)]] = False
-        kept.append((values[~off], record[~off]))
+        rows.append(values[~off] / (rms(record[~off]) or 1.0))
+        records.append(record[~off])
         outliers += int(np.count_nonzero(off))
-    longest = max(len(row) for row, _ in kept)
-    residual, weight, padded = np.zeros((3, len(kept), longest))
-    for i, (row, record) in enumerate(kept):
-        n = len(record)
-        size = rms(record) or 1.0
-        weight[i, :n] = 1.0 / (size * np.sqrt(n))
-        residual[i, :n] = row * weight[i, :n]
-        padded[i, :n] = record
-    return residual, weight, padded, outliers
+    return rows, records, outliers

@@ -1,41 +1,24 @@
-"""What a residual is made of: noise, or structure."""
+"""What a residual is made of: noise, or structure.
 
-from collections.abc import Sequence
+Rows are residuals of runs over the root mean square of each record.
+"""
+
 from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.ndimage import median_filter
 
 from discover.statistics.noise import whiteness
+from discover.statistics.noise.noise_model import Rows, rms
 
 
-@dataclass(frozen=True)
-class ResidualSummary:
-    """Noise and structure in the residuals of some runs.
-
-    `noise`: relative, by run, from third differences.
-    """
-
-    noise: Float[np.ndarray, " runs"]
-    autocorrelation: Float[np.ndarray, " runs"]  # correlation of neighbouring residuals of each run
-
-
-def summarise(
-    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
-) -> ResidualSummary:
-    """Return noise (`fast_part`) and correlation of weighted residuals."""
-    noise, correlation = [], []
-    for row, w in zip(residual, weight, strict=True):
-        values = row[w > 0] * np.sqrt(np.count_nonzero(w))
-        n = len(values)
-        noise.append(fast_part(values))
-        power = float(np.sum(values**2))
-        rho = float(np.sum(values[1:] * values[:-1])) / power if power > 0 and n > 2 else 0.0
-        rho = float(np.clip(rho, 0.0, 0.99))
-        correlation.append(rho)
-    return ResidualSummary(np.array(noise), np.array(correlation))
+def lag_one_correlation(row: Float[np.ndarray, " n"]) -> float:
+    """Return the correlation of neighbours, from 0 to 0.99; 0 of fewer than three samples."""
+    power = float(np.sum(row**2))
+    rho = float(np.sum(row[1:] * row[:-1])) / power if power > 0 and len(row) > 2 else 0.0
+    return float(np.clip(rho, 0.0, 0.99))
 
 
 def fast_part(values: Float[np.ndarray, " n"]) -> float:
@@ -65,69 +48,43 @@ def slow_part(values: Float[np.ndarray, " n"]) -> float:
     return float(np.sqrt(max(power, 0.0)))
 
 
-def _median_difference(rows: Sequence[Float[np.ndarray, " _"]], order: int) -> float:
+def _median_difference(rows: Rows, order: int) -> float:
     """Return the standard deviation of white noise with these differences, by their median."""
     differences = np.concatenate([np.diff(row, order) for row in rows])
     return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(comb(2 * order, order)))
 
 
-def noise_floor(
-    residual: Float[np.ndarray, "runs n"],
-    weight: Float[np.ndarray, "runs n"],
-    probability: float | None,
-) -> float:
+def noise_floor(rows: Rows, probability: float | None) -> float:
     """Return the relative noise, mean over runs.
 
     The size of a residual that is noise (single samples count up to six times the noise), else the
     part that changes from sample to sample; correlated noise is then underestimated. Runs too short
-    to be tested are as noisy as the others, or as what changes in them if that is more.
-    `probability`: by `noise_probability`.
+    to be tested are as noisy as the others, or as what changes in them if that is more; where all
+    are, the noise is the same in all, from fourth differences. `probability`: by
+    `noise_probability`.
     """
-    fast = summarise(residual, weight).noise
-    samples = np.count_nonzero(weight > 0, axis=1)
+    fast, samples = np.array(list(map(fast_part, rows))), np.array(list(map(len, rows)))
     tested = samples >= whiteness.FEWEST_TESTED
     known = probability is not None and probability > whiteness.SIGNIFICANCE
     if not known and not np.any(tested) and np.all(samples >= whiteness.FEWEST_FAST):
-        return _pooled_fast_part(residual, weight)
+        return _median_difference(rows, 4)
     if not known and probability is not None:
         return float(np.mean(fast))
-    sizes = np.array([_limited_size(r[w > 0]) for r, w in zip(residual, weight, strict=True)])
+    sizes = np.array(list(map(_limited_size, rows)))
     if np.any(tested):
         sizes = np.where(tested, sizes, np.maximum(fast, np.mean(sizes[tested])))
     return float(np.mean(sizes))
 
 
-def _pooled_fast_part(
-    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
-) -> float:
-    """Return the relative noise of short runs, the same in all, from fourth differences."""
-    rows = [r[w > 0] * np.sqrt(np.count_nonzero(w)) for r, w in zip(residual, weight, strict=True)]
-    return _median_difference(rows, 4)
-
-
-def _limited_size(values: Float[np.ndarray, " n"]) -> float:
-    """Return the norm of values, each limited to so many robust deviations beside it.
+def _limited_size(row: Float[np.ndarray, " n"]) -> float:
+    """Return the root mean square, each value limited to so many robust deviations beside it.
 
     A loud stretch counts in full; up to three samples are no stretch, two at an end.
     """
-    if len(values) < whiteness.FEWEST_FAST:
-        return float(np.linalg.norm(values))
-    beside = 1.4826 * median_filter(np.abs(values), whiteness.FEWEST_FAST, mode="mirror")
-    return float(np.linalg.norm(np.clip(values, -_LARGEST * beside, _LARGEST * beside)))
-
-
-def judging(weight: Float[np.ndarray, "runs n"]) -> Bool[np.ndarray, " runs"]:
-    """Return which runs are long enough to tell their noise; all if none is.
-
-    A run counts as much as any other, so that one bad sample could decide alone.
-    """
-    told = np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST
-    return told if np.any(told) else np.ones_like(told)
-
-
-def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
-    """Return whether any run is long enough to say how noisy it is."""
-    return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST))
+    if len(row) < whiteness.FEWEST_FAST:
+        return rms(row)
+    beside = 1.4826 * median_filter(np.abs(row), whiteness.FEWEST_FAST, mode="mirror")
+    return rms(np.clip(row, -_LARGEST * beside, _LARGEST * beside))
 
 
 _BLOCK, _FEWEST_BLOCKS = 8, 3
@@ -148,20 +105,14 @@ class Expectation:
     linear_error: float = 0.0  # relative error of the linear data that the declared modes come from
     repeat_error: float = 0.0
 
-    def explains(
-        self,
-        residual: Float[np.ndarray, "runs n"],
-        weight: Float[np.ndarray, "runs n"],
-        probability: float | None,
-        floor: float,
-    ) -> bool:
+    def explains(self, rows: Rows, probability: float | None, floor: float) -> bool:
         """Return whether noise and the error of the linear data explain a residual.
 
         It may be no larger than both together. A pattern that noise has not may be no larger than
         the error of the linear data or of repeats; or the whole no larger than a given noise.
         `probability`: by `noise_probability`. `floor`: relative noise.
         """
-        error = float(np.mean(np.sqrt(np.sum(residual**2, axis=1))))
+        error = float(np.mean(list(map(rms, rows))))
         if error > STRUCTURE * float(np.hypot(max(floor, self.repeat_error), self.linear_error)):
             return False
         if probability is None or probability > whiteness.SIGNIFICANCE:
@@ -170,6 +121,4 @@ class Expectation:
             return error <= float(np.hypot(self.noise, self.linear_error))
         # a pattern may be due to the sweep or to loadings
         excused = float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
-        rows = zip(residual, weight, strict=True)
-        slow = [slow_part(r[w > 0] * np.sqrt(np.count_nonzero(w))) for r, w in rows]
-        return excused > 0.0 and float(np.mean(slow)) <= excused
+        return excused > 0.0 and float(np.mean(list(map(slow_part, rows)))) <= excused

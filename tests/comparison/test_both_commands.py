@@ -44,42 +44,6 @@ def noisy(stress, generator):
     return white(stress, 0.01, generator)
 
 
-def coefficient(compared, name):
-    return next(t for t in compared.outcomes["tensor_sindy"].terms if t.term == name)
-
-
-def parameter(looped, effect, name):
-    return next(s for s in looped.stages if s.effect == effect).parameters[name]
-
-
-def overlap(one, other):
-    return max(one[0], other[0]) <= min(one[1], other[1])
-
-
-@pytest.mark.slow
-def test_of_a_giesekus_fluid_both_find_the_mobility(tmp_path):
-    compared, looped = asked(tmp_path, Giesekus(MOBILITY, MODULUS), noisy)
-    assert (compared.verdict, looped.verdict) == ("explained", "effects_added")
-    term = coefficient(compared, "sigma.sigma")
-    assert overlap(term.ci95, parameter(looped, "giesekus_mobility", "alpha").ci95)
-    # three standard deviations
-    assert abs(term.coefficient - MOBILITY) < 1.6 * (term.ci95[1] - term.coefficient)
-    assert compared.undetermined == ["N2"]
-
-
-@pytest.mark.slow
-def test_of_a_transducer_with_a_gain_both_find_the_gain(tmp_path):
-    compared, looped = asked(tmp_path, Giesekus(MOBILITY, MODULUS), lambda s, g: GAIN * noisy(s, g))
-    assert (compared.verdict, looped.verdict) == ("explained", "effects_added")
-    gain = parameter(looped, "stress_gain", "gain_error")
-    assert overlap(parameter(compared.posterior, "stress_gain", "gain_error").ci95, gain.ci95)
-    assert abs(gain.value - (GAIN - 1.0)) < 1.6 * (gain.ci95[1] - gain.value)
-    term = coefficient(compared, "sigma.sigma")
-    assert overlap(term.ci95, parameter(looped, "giesekus_mobility", "alpha").ci95)
-    # a fluid a tenth stiffer has this stress too, and another N1
-    assert "N1" in compared.undetermined
-
-
 @pytest.mark.slow
 def test_of_two_modes_told_one_neither_has_an_explanation(tmp_path):
     two = multimode_giesekus([0.1, 0.6], [60.0, 40.0], [1.0, 0.3])
@@ -93,3 +57,4 @@ def test_in_noise_neither_finds_a_signal(tmp_path):
         tmp_path, Giesekus(MOBILITY), lambda s, g: 5.0 * g.standard_normal(len(s))
     )
     assert (compared.verdict, looped.verdict) == ("no_signal", "no_signal")
+    assert compared.lack_of_fit["tensor_sindy"].verdict == "no_signal"

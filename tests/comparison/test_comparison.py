@@ -7,6 +7,7 @@ import pytest
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
+from discover.comparison.flows import true_terms
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study import parse_study
@@ -74,3 +75,20 @@ def test_an_outcome_comes_back_from_its_state_unchanged():
     assert again.predictions["test/b"] is None
     for quantity, values in wave.items():
         np.testing.assert_array_equal(again.predictions["test/a"][quantity], values)
+
+
+@pytest.mark.parametrize(
+    ("law", "parameters", "terms"),
+    [
+        ("ucm", {}, []),
+        ("giesekus", {"alpha": 0.3}, [("sigma.sigma", 0.3)]),
+        ("saramito", {"yield_strain": 0.1}, None),
+    ],
+)
+def test_true_terms_are_those_of_the_law_and_of_a_relaxation_that_is_not_known(
+    law, parameters, terms
+):
+    for known, more in ((True, []), (False, [("sigma", 1.0)])):
+        found = true_terms(law, parameters, known)
+        told = None if found is None else [(one.term, one.coefficient) for one in found]
+        assert told == (None if terms is None else [*more, *terms])

@@ -10,7 +10,6 @@ from discover.identify.exact_series import (
     PRIME,
     compare_series,
     exact_terms,
-    hidden_change,
     residue,
     solve_for_coefficient,
     stress_series,
@@ -132,13 +131,6 @@ def test_an_irrational_twin_is_given_but_not_called_proved():
     value, proved = found[0]
     assert value == pytest.approx(0.5 - np.sqrt(0.1), rel=1e-12)
     assert not proved
-
-
-def test_the_change_of_hidden_stresses_is_read_off_the_series():
-    # with N1 kept: σ22 → 0, and σ11 = N1 = (1 + 1/4) of Johnson–Segalman's σ11 at ξ = 2/5
-    change = hidden_change({SLIP: Fraction(1, 5)}, {"tr(sigma)*gammadot": Fraction(8, 25)})
-    assert change == {"sigma11": "5/4 sigma11", "sigma22": "0", "sigma33": "0"}
-    assert hidden_change({}, {"sigma.sigma": Fraction(1, 5)}) == {}
 
 
 def test_sums_of_terms_are_spelled_with_signs():

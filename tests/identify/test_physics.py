@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from discover.identify.physics import check_physics, see
-from discover.identify.physics_flows import SHEAR, UNIAXIAL, steady_branch
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
 from discover.protocols import imposed_stress, in_flow, oscillatory_shear, start_up
 from tensor_library import TermLibrary, parse_term
@@ -95,22 +94,6 @@ def test_where_no_rate_is_given_conformations_are_those_of_oscillations_like_in_
     assert [one.passed for one in told] == [True, True]
     assert told[0].where.startswith("oscillation at Wi = 2, ")
     assert told[1].where == "b"
-
-
-def test_steady_slip_is_the_analytic_one():
-    rates = np.geomspace(0.01, 10, 121)
-    branch = steady_branch(JohnsonSegalman(0.4), SHEAR, rates)
-    assert branch.is_steady.all()
-    np.testing.assert_allclose(branch.stress[:, 3], rates / (1 + 0.64 * rates**2), rtol=1e-9)
-    # homogeneous shear itself is stable even where the curve falls
-    assert branch.is_stable.all()
-
-
-def test_steady_maxwell_extension_is_analytic_until_it_is_unstable():
-    rates = np.array([0.1, 0.3, 0.45, 0.55])
-    branch = steady_branch(UpperConvectedMaxwell(), UNIAXIAL, rates)
-    np.testing.assert_allclose(branch.stress[:, 0], 2 * rates / (1 - 2 * rates), rtol=1e-9)
-    assert branch.is_stable.tolist() == [True, True, True, False]
 
 
 @pytest.mark.slow

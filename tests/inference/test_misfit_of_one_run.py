@@ -10,7 +10,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.problem import Problem
 from discover.protocols.between_samples import sampling_interval
-from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics import lack_of_fit
 from tensor_library.terms import parse_term
 
 SCALE = {"modulus": 100.0, "relaxation_time": 1.0}
@@ -49,7 +49,7 @@ def left_by(fluid, names, seed):
 def verdict(left, runs, with_times=True):
     """Return the verdict, with the times of the samples or without."""
     intervals = [sampling_interval(run.time, run.protocol) for run in runs] if with_times else None
-    return what_is_left(left, [run.recorded for run in runs], intervals=intervals).verdict
+    return lack_of_fit(left, [run.recorded for run in runs], intervals=intervals).verdict
 
 
 def test_slip_and_two_terms_do_not_explain_a_white_metzner_fluid():

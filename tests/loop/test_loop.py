@@ -17,7 +17,6 @@ from discover.loop import DeclaredModel, run_loop
 from discover.programs.program_cache import Compiled
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
-from discover.statistics.residual import summarise
 
 TIMES = np.linspace(0.05, 10.0, 120)
 DECLARED = DeclaredModel.maxwell(100.0, 1.0)
@@ -200,17 +199,6 @@ def test_a_noise_that_is_given_is_believed():
     dataset = make_dataset(Giesekus(0.2))
     result = loop(dataset, effects=("stress_offset",), noise=0.9, max_effects=1)
     assert result.noise_floor == 0.9
-
-
-def test_the_noise_of_a_smooth_misfit_is_not_its_size():
-    generator = np.random.default_rng(0)
-    noise = 0.01 * generator.standard_normal(400)
-    trend = 0.2 * np.sin(np.linspace(0, 6, 400))
-    weight = np.full((1, 400), 1 / np.sqrt(400))
-    white = summarise((noise / np.sqrt(400))[None], weight)
-    smooth = summarise(((noise + trend) / np.sqrt(400))[None], weight)
-    assert np.mean(white.noise) == pytest.approx(0.01, rel=0.2)
-    assert np.mean(smooth.noise) == pytest.approx(0.01, rel=0.2)
 
 
 MELT_CANDIDATES = [

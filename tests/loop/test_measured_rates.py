@@ -6,13 +6,12 @@ import pytest
 
 from discover.dataset import Dataset, Run
 from discover.dataset.records.repeats import in_sequence
-from discover.dataset.records.thinning import thin_run
 from discover.effects import Record, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus
 from discover.loop import DeclaredModel, run_loop, run_loop_on_each
-from discover.protocols import measured_rate, start_up
+from discover.protocols import start_up
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)
@@ -29,27 +28,6 @@ def start_ups(alpha, rates=(0.5, 1.0, 2.0), noise=0.01):
         stress = stress * (1.0 + noise * generator.standard_normal(len(TIMES)))
         runs.append(Run(f"{rate:g}", TIMES, start_up(rate), np.full(80, rate), stress))
     return Dataset("start-ups", tuple(runs))
-
-
-@pytest.mark.parametrize("effect", ["stress_offset", "rate_rise_time", "thixotropy"])
-def test_a_run_from_a_steady_flow_relaxes_to_the_next_one(effect):
-    before, after = 2.0, 0.5
-    run = Run("down", TIMES, start_up(after), np.full(80, after), np.ones(80), rate_before=before)
-    # an effect at zero amplitude changes nothing, whatever the program it is compiled into
-    model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0), [make_effect(effect)])
-    predicted = model.predict(model.zero(), make_batch([run]))[0]
-    exact = 100.0 * (after + (before - after) * np.exp(-TIMES))
-    np.testing.assert_allclose(predicted, exact, rtol=1e-4)
-
-
-def test_a_run_from_a_steady_flow_starts_at_the_steady_state_of_a_nonlinear_law():
-    run = Run("on", TIMES, start_up(30.0), np.full(80, 30.0), np.ones(80), rate_before=30.0)
-    declared = DeclaredModel.named("giesekus", {"alpha": 0.3}, 100.0, 1.0)
-    model = AugmentedModel(declared, [make_effect("stress_offset")])
-    predicted = model.predict(model.zero(), make_batch([run]))[0]
-    fluid = Fluid(Giesekus(0.3), jnp.asarray(100.0), jnp.asarray(1.0))
-    steady = simulate(fluid, start_up(30.0), np.array([40.0])).shear_stress[0]
-    np.testing.assert_allclose(predicted, steady, rtol=1e-4)
 
 
 def test_strain_is_counted_from_the_start_of_the_run_and_not_of_the_flow_before_it():
@@ -117,15 +95,3 @@ def test_what_was_lost_in_earlier_runs_stays_lost():
     # the first run strained the sample by 8
     used = model.predict(theta, make_batch([later]))[0]
     np.testing.assert_allclose(used, np.exp(-0.05 * 8.0) * fresh, rtol=1e-9)
-
-
-@pytest.mark.parametrize("samples", [400, 100])
-def test_thinned_runs_hold_the_same_flow(samples):
-    times = np.linspace(0.01, 20.0, 2000)
-    rates = np.cos(times)
-    run = Run("wave", times, measured_rate(times, rates), rates, np.sin(times))
-    thinned = thin_run(run, samples)
-    assert len(thinned) == samples
-    assert thinned.time[-1] == times[-1]
-    strain = np.array([float(thinned.protocol.strain(jnp.asarray(t))) for t in (5.0, 20.0)])
-    np.testing.assert_allclose(strain, np.sin([5.0, 20.0]), atol=2e-3)

@@ -128,20 +128,6 @@ def test_a_signal_altered_by_nothing_is_the_signal():
         np.testing.assert_allclose(model.predict(theta, batch), plain, rtol=1e-8)
 
 
-def test_a_spring_in_series_makes_the_fluid_slower():
-    """σ/η + (1/G + C) dσ/dt = γ̇ of a Maxwell fluid: one of a smaller modulus, as viscous."""
-    one, _ = run(BEFORE, AFTER)
-    modulus, time, compliance = 1.0, 1.0, 0.05
-    model = AugmentedModel(DeclaredModel.maxwell(modulus, time), [make_effect("tool_compliance")])
-    theta = model.zero()
-    theta[model.positions("tool_compliance")] = compliance
-    slower = time * (1.0 + compliance * modulus)
-    fading = np.exp(-TIMES / slower)
-    exact = modulus * time * (AFTER + (BEFORE - AFTER) * fading)
-    found = model.predict(theta, make_batch([one]))[0]
-    np.testing.assert_allclose(found, exact, atol=2e-3 * exact[0])
-
-
 def test_a_vector_that_runs_away_before_the_record_is_told_so():
     one, _ = run(BEFORE, AFTER)
     model = AugmentedModel(DeclaredModel.maxwell(1.0, 1.0), [make_effect("giesekus_mobility")])

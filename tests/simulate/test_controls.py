@@ -8,17 +8,26 @@ import numpy as np
 import pytest
 from independent import Giesekus
 from independent.sweeps import strain_at
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flows import PeriodicFlows
 from discover.forward.grid import stress_grid
-from discover.protocols import imposed_stress, start_up, steady_rates
+from discover.protocols import (
+    after_alternation,
+    after_step_strain,
+    imposed_stress,
+    in_flow,
+    oscillations,
+    oscillatory_shear,
+    start_up,
+    steady_rates,
+)
 
 MODULUS, TIME = 100.0, 1.0
-TIMES = np.geomspace(0.01, 10.0, 60)
+TIMES, COUNTED = np.geomspace(0.01, 10.0, 60), np.arange(1.0, 4.0)
 # in every model, used or not, so that all share their code
 IN_SERIES = "wall_slip", "tool_compliance"
 
@@ -56,25 +65,6 @@ def predicted(declared, *runs, effects=(), **values):
     for name, value in values.items():
         theta[model.positions(name)[0]] = value
     return model.predict(theta, make_batch(runs))
-
-
-def test_steady_states_are_those_of_the_closed_form_over_five_decades_of_rate():
-    rates = np.geomspace(0.01, 1e3, 26)
-    exact = np.array([Giesekus(0.3, MODULUS, TIME).steady_shear(rate) for rate in rates])
-    run = flow_curve(rates, first_normal_stress_difference=exact[:, 1])
-    found = predicted(giesekus(0.3), run, run.observing("N1"))
-    # Newton's last steps: rounding, amplified in N1 at small rates, where it is a small difference
-    np.testing.assert_allclose(found[0], exact[:, 0], rtol=1e-10)
-    np.testing.assert_allclose(found[1], exact[:, 1], rtol=1e-6)
-
-
-def test_a_flow_curve_with_slip_is_that_of_the_rate_which_is_left():
-    rates, slip = np.geomspace(0.01, 100.0, 12), 0.01
-    run = flow_curve(rates, first_normal_stress_difference=np.ones(12))
-    stress = predicted(giesekus(0.3), run, run.observing("N1"), wall_slip=slip)[0]
-    law = Giesekus(0.3, MODULUS, TIME)
-    left = [law.steady_shear(rate)[0] for rate in rates - slip * stress]
-    np.testing.assert_allclose(stress, left, rtol=1e-9)
 
 
 def test_what_needs_time_or_strain_does_not_act_on_steady_states():
@@ -146,45 +136,30 @@ def test_noise_in_a_strain_is_not_taken_for_flow():
     assert steps[2] < 1.1 * steps[1]
 
 
-def test_a_tool_with_inertia_rings_in_creep_as_scipy_has_it():
-    times, stress, inertia = np.linspace(0.02, 4.0, 200), 20.0, 0.5
-
-    def change(t, y):
-        shear, rate, _ = y
-        return [MODULUS * rate - shear / TIME, (stress - shear) / inertia, rate]
-
-    exact = solve_ivp(change, (0.0, 4.0), np.zeros(3), t_eval=times, rtol=1e-9, atol=1e-11).y[2]
-    # followed to second order, with some forty steps a period: 0.14 % was measured
-    run = at_stress(times, np.full(200, stress))
-    strain = predicted(
-        MAXWELL, run, effects=["instrument_inertia"], instrument_inertia=inertia
-    )[0]  # fmt: skip
-    assert np.linalg.norm(strain - exact) < 0.003 * np.linalg.norm(exact)
-    without = stress / MODULUS * (1.0 + times / TIME)
-    assert np.linalg.norm(without - exact) > 0.08 * np.linalg.norm(exact)
-
-
-def test_compliance_adds_its_strain_and_a_gain_its_stress_in_creep():
-    stress = np.full(60, 20.0)
-    run = at_stress(TIMES, stress)
-    plain = predicted(MAXWELL, run)[0]
-    names = ["tool_compliance", "stress_gain"]
-    softer = predicted(MAXWELL, run, effects=names, tool_compliance=1e-3)[0]
-    np.testing.assert_allclose(softer - plain, 1e-3 * stress, rtol=1e-9)
-    # 1.25 times too much is recorded: the true stress is 16 Pa, and Maxwell's strain in proportion
-    gained = predicted(MAXWELL, run, effects=names, stress_gain=0.25)[0]
-    np.testing.assert_allclose(gained, plain / 1.25, rtol=1e-9)
-
-
-def test_runs_of_several_controls_are_predicted_as_each_alone():
-    rates = np.geomspace(0.1, 10.0, 9)
-    start = Run("start", TIMES, start_up(2.0), np.full(60, 2.0), np.ones(60))
-    runs = [start, flow_curve(rates), at_stress(TIMES[:50], np.full(50, 30.0))]
+def test_runs_of_every_kind_are_predicted_together_as_each_alone():
+    rates, ones = np.geomspace(0.1, 10.0, 9), np.ones(60)
+    strains, wave = np.array([0.1, 1.0, 10.0]), oscillatory_shear(1.0, 1.0)
+    swing = after_alternation(wave, 2.0 * np.pi, TIMES)
+    sweep = Run(
+        "sweep", COUNTED, oscillations(strains, np.ones(3)), strains, np.ones(3), strain=strains,
+        storage_modulus=np.ones(3), loss_modulus=np.ones(3),
+    )  # fmt: skip
+    storage, loss = sweep.records
+    flows = {
+        "start": start_up(2.0), "stretched": in_flow(start_up(0.6), "uniaxial"), "swing": swing,
+        "step": after_step_strain(start_up(0.0), 2.0, first=float(TIMES[0])),
+    }  # fmt: skip
+    in_time = [Run(name, TIMES, flow, ones, ones) for name, flow in flows.items()]
+    creep = at_stress(TIMES[:50], np.full(50, 30.0))
+    runs = [loss, *in_time, flow_curve(rates), creep, storage]
     declared = giesekus(0.3)
-    together = predicted(declared, *runs)
-    for row, run in zip(together, runs, strict=True):
-        # the grid of a run is its own
-        np.testing.assert_allclose(row[: len(run)], predicted(declared, run)[0], rtol=1e-12)
+    batch = make_batch(runs)
+    # both moduli of a sweep are of one solution
+    assert [len(p.strain) for p in batch.parts if isinstance(p, PeriodicFlows)] == [len(strains)]
+    for row, run in zip(predicted(declared, *runs), runs, strict=True):
+        # where a cycle closes Newton's last step differs
+        rtol = 1e-6 if run.name == "swing" else 1e-9
+        np.testing.assert_allclose(row[: len(run)], predicted(declared, run)[0], rtol=rtol)
 
 
 def test_a_jump_of_stress_is_a_jump_and_a_wave_is_none():

@@ -14,7 +14,13 @@ from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import dynamics_of_fluid, observed_on_grid, solved_on_grid
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.classical import Giesekus
-from discover.protocols import imposed_stress, oscillations, start_up, steady_rates
+from discover.protocols import (
+    imposed_stress,
+    oscillations,
+    oscillatory_shear,
+    start_up,
+    steady_rates,
+)
 from discover.protocols.protocol import recording
 from discover.simulate import SimulationError, observe, simulate
 
@@ -113,7 +119,13 @@ def test_steady_states_are_solved_for_once_each_however_many_samples_stand_besid
 
 @pytest.mark.parametrize(
     ("protocol", "times"),
-    [(imposed_stress(TIMES, STRESS), TIMES), pytest.param(SWEEP, COUNTED, marks=pytest.mark.slow)],
+    [
+        (imposed_stress(TIMES, STRESS), TIMES),
+        (steady_rates(np.array([3.0])), COUNTED[:1]),
+        pytest.param(SWEEP, COUNTED, marks=pytest.mark.slow),
+        pytest.param(oscillatory_shear(2.0, 1.0), np.linspace(0, 4, 9), marks=pytest.mark.slow),
+    ],
+    ids=["creep", "steady", "sweep", "oscillation"],
 )
 def test_derivatives_forward_and_in_reverse_are_differences(protocol, times):
     flows = lay_out([protocol], [times])

@@ -23,7 +23,6 @@ from discover.protocols import (
     recorded_at,
     shear_rates,
     start_up,
-    step_rates,
 )
 from discover.simulate import simulate
 
@@ -64,14 +63,6 @@ def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     np.testing.assert_allclose(in_the_loop([protocol])[0], exact, rtol=1e-4)
 
 
-def test_shear_beside_extension_is_what_it_is_alone():
-    shear = step_rates([0.0, 2.0], [1.0, -0.5])
-    stretched = in_flow(start_up(0.6), "uniaxial")
-    both = in_the_loop([shear, stretched])
-    np.testing.assert_allclose(both[0], in_the_loop([shear])[0], rtol=1e-9)
-    np.testing.assert_allclose(both[1], in_the_loop([stretched])[0], rtol=1e-9)
-
-
 def test_relaxation_after_a_step_of_strain_is_that_of_scipy():
     held = after_step_strain(start_up(0.0), 2.0, TIMES[0])
     begins, length = float(held.begins), -float(held.begins)
@@ -95,31 +86,6 @@ def test_a_step_of_strain_at_once_leaves_the_elastic_stress_of_maxwell():
     np.testing.assert_allclose(
         stress.first_normal_stress_difference, 1.5 * stress.shear_stress, rtol=2e-5
     )
-
-
-def test_what_follows_a_steady_flow_is_that_of_scipy_on_the_grids_of_the_learners():
-    run = Run("down", TIMES, start_up(0.2), np.full(30, 0.2), np.ones(30), rate_before=2.0)
-    exact = BY_SCIPY.recorded(
-        "shear", lambda t: 2.0 if t < 0.0 else 0.2, TIMES, begins=-40.0, jumps=[0.0]
-    )
-    found = observed_in(fluid(), run.protocol, TIMES)[:, 0]
-    # the flow before is followed for 80 s, 27 relaxation times; the grid is good to 1e-5
-    np.testing.assert_allclose(found, exact, rtol=2e-5)
-
-
-@pytest.mark.parametrize("sampled", [pytest.param(False, marks=pytest.mark.slow), True])
-def test_an_oscillation_that_had_gone_on_is_periodic_from_its_first_sample(sampled):
-    period = 2.0 * np.pi / 2.0
-    times = np.linspace(0.0, 2.0 * period, 129)
-    wave = oscillatory_shear(3.0, 2.0)
-    if sampled:
-        wave = measured_rate(times, 3.0 * np.cos(2.0 * times))
-    found = in_the_loop([after_alternation(wave, period, times)], times)[0]
-    size = np.max(np.abs(found))
-    # λω is 0.4 and 6: ten cycles leave exp(−10 · 2π/6) = 3e-5 of the transient
-    assert np.max(np.abs(found[:65] - found[64:])) < 1e-4 * size
-    started = in_the_loop([wave], times)[0]
-    assert np.max(np.abs(started[:65] - started[64:])) > 0.05 * size
 
 
 @pytest.mark.parametrize("kind", ["shear", "uniaxial"])

@@ -1,16 +1,13 @@
 """Moduli of the first harmonic, against scipy and closed forms."""
 
 import numpy as np
-import pytest
-from independent.sweeps import first_harmonic, giesekus_modulus, oscillating
 
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flows import PeriodicFlows
-from discover.protocols import oscillations, start_up
+from discover.protocols import oscillations
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.3
 STRAINS, FREQUENCIES = np.array([0.1, 1.0, 10.0, 2.0]), np.array([1.0, 1.0, 0.3, 30.0])
@@ -72,55 +69,3 @@ def test_coulomb_friction_adds_to_the_loss_modulus_alone():
     added = predicted(MAXWELL, sweep(), bearing_friction=2.0) - predicted(MAXWELL, sweep())
     # 4/π of a square wave; the trapezoidal rule meets its kink
     np.testing.assert_allclose(added, 4j * 2.0 / np.pi / STRAINS, rtol=1e-3, atol=1e-5)
-
-
-@pytest.mark.parametrize(("name", "value"), [("tool_compliance", 1e-3), ("wall_slip", 2e-3)])
-def test_what_gives_way_in_series_adds_to_the_compliance_of_a_linear_fluid(name, value):
-    found = predicted(MAXWELL, sweep(), **{name: value})
-    x = FREQUENCIES * TIME
-    fluid = MODULUS * (x**2 + 1j * x) / (1.0 + x**2)
-    taken = value if name == "tool_compliance" else value / (1j * FREQUENCIES)
-    np.testing.assert_allclose(1.0 / found, 1.0 / fluid + taken, rtol=1e-6)
-
-
-def test_slip_of_a_giesekus_fluid_is_that_of_scipy_but_for_higher_harmonics():
-    slip, plain = 2e-3, predicted(GIESEKUS, sweep())
-    found = predicted(GIESEKUS, sweep(), wall_slip=slip)
-    pairs = zip(STRAINS, FREQUENCIES, strict=True)
-    exact = np.array([giesekus_modulus(MOBILITY, MODULUS, TIME, *pair, slip) for pair in pairs])
-    # what the fluid feels of the higher harmonics of its slip is left out: 5e-3 was measured
-    assert np.all(abs(found - exact) < 7e-3 * abs(exact))
-    assert np.max(abs(plain / exact - 1.0)) > 0.1
-
-
-def test_a_structure_that_flow_breaks_is_that_of_scipy():
-    model = AugmentedModel(MAXWELL, [named_effects()["thixotropy"]])
-    theta = model.zero()
-    theta[model.positions("thixotropy")] = [0.5, 3.0]
-    strain, frequency = 1.0, 2.0
-    run = sweep(np.array([strain]), np.array([frequency]))
-    storage, loss = model.predict(theta, make_batch(run.records))[:, 0]
-
-    def change(t, y):
-        rate = strain * frequency * np.cos(frequency * t)
-        return [MODULUS * rate - y[0] / TIME, (1.0 - y[1]) / 3.0 - 0.5 * abs(rate) * y[1]]
-
-    times, values = oscillating(change, [0.0, 1.0], frequency, 20)
-    exact = first_harmonic(times, values[0] * values[1], frequency) / strain
-    # the level is of second order in the step
-    assert abs(storage + 1j * loss - exact) < 1e-3 * abs(exact)
-
-
-def test_a_sweep_beside_a_transient_is_predicted_as_alone_and_both_moduli_at_once():
-    times = np.geomspace(0.01, 10.0, 30)
-    start = Run("start", times, start_up(2.0), np.full(30, 2.0), np.ones(30))
-    model = AugmentedModel(GIESEKUS, [])
-    storage, loss = sweep().records
-    batch = make_batch([loss, start, storage])
-    assert [len(part.strain) for part in batch.parts if isinstance(part, PeriodicFlows)] == [4]
-    together = model.predict(model.zero(), batch)
-    plain = predicted(GIESEKUS, sweep())
-    np.testing.assert_allclose(together[[2, 0], :4], [plain.real, plain.imag], rtol=1e-12)
-    np.testing.assert_allclose(
-        together[1], model.predict(model.zero(), make_batch([start]))[0], rtol=1e-12
-    )

@@ -1,5 +1,4 @@
 import independent
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,8 +7,7 @@ from scipy.integrate import solve_ivp
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.forward.exponential_weights import phi_functions
-from discover.forward.fluids import observed_on_grid
-from discover.forward.grid import STRAIN_STEP, make_grid, make_grids
+from discover.forward.grid import STRAIN_STEP, make_grid
 from discover.forward.of_fluids import bare_run, observed, observed_in
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell, make_law
 from discover.protocols import (
@@ -29,33 +27,6 @@ def by_scipy(law, flow, times):
     """Return σ12, N1 and N2, to 1e-9."""
     found = law.respond(flow, times)
     return np.stack([found.sigma12, found.N1, found.N2], axis=-1)
-
-
-def test_maxwell_start_up_matches_the_analytic_solution():
-    times, rate = np.linspace(0, 8, 33), 1.7
-    stress = simulate(Fluid.dimensionless(UpperConvectedMaxwell()), start_up(rate), times)
-    decay = np.exp(-times)
-    np.testing.assert_allclose(stress.shear_stress, rate * (1 - decay), atol=1e-7)
-    np.testing.assert_allclose(
-        stress.first_normal_stress_difference, 2 * rate**2 * (1 - decay * (1 + times)), atol=1e-6
-    )
-    np.testing.assert_allclose(stress.second_normal_stress_difference, 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("frequency", [0.3, 1.0, 4.0])
-def test_small_oscillation_gives_the_maxwell_moduli(frequency):
-    times = np.linspace(0, 40, 2001)
-    amplitude = 1e-3
-    stress = simulate(
-        Fluid.dimensionless(Giesekus(0.3)), oscillatory_shear(amplitude, frequency), times
-    )
-    late = times > 25.0  # exp(-25) of the start is left
-    basis = np.stack([np.cos(frequency * times), np.sin(frequency * times)], axis=1)[late]
-    in_phase, out_of_phase = np.linalg.lstsq(basis, stress.shear_stress[late], rcond=None)[0]
-    viscosity = 1.0 / (1.0 + frequency**2)
-    # nonlinearity enters at the square of the strain amplitude, 1e-5 here
-    assert in_phase / amplitude == pytest.approx(viscosity, rel=1e-4)
-    assert out_of_phase / amplitude == pytest.approx(frequency * viscosity, rel=1e-4)
 
 
 @pytest.mark.slow
@@ -132,23 +103,6 @@ def test_a_cessation_is_not_smeared_over_a_step():
         simulate(fluid, flow, times).shear_stress,
     ):
         np.testing.assert_allclose(stress, expected, atol=1e-6)
-
-
-@pytest.mark.slow
-def test_forward_and_reverse_gradients_agree_with_finite_differences():
-    flow, times = oscillatory_shear(2.0, 1.0), np.linspace(0, 4, 9)
-    grid = jax.tree.map(lambda leaf: leaf[0], make_grids([flow], [times]))
-
-    def total(mobility):
-        fluid = Fluid(Giesekus(mobility), [1.0, 2.0], [1.0, 0.3])
-        return jnp.sum(observed_on_grid(fluid, flow, grid)[:, 0])
-
-    reverse = jax.grad(total)(0.2)
-    _, forward = jax.jvp(total, (0.2,), (1.0,))
-    # central difference: error of order step², 1e-8, and rounding of 1e-16/1e-4
-    difference = (total(0.2001) - total(0.1999)) / 2e-4
-    assert float(forward) == pytest.approx(float(reverse), rel=1e-10)
-    assert float(forward) == pytest.approx(float(difference), rel=1e-6)
 
 
 def test_a_law_that_runs_away_on_a_grid_gives_no_error_and_no_finite_number():

@@ -1,6 +1,5 @@
 """Steady states that are solved for, against start-ups that scipy follows until they are steady."""
 
-import jax
 import numpy as np
 import pytest
 from independent import PhanThienTanner, steps
@@ -11,13 +10,10 @@ from scipy.optimize import brentq
 
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import observed_on_grid
 from discover.forward.grid import make_grid
-from discover.forward.of_fluids import bare_run, observed, observed_in
+from discover.forward.of_fluids import observed_in
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
-from discover.laws.textbook.classical import Giesekus
 from discover.protocols import after_steady_flow, in_flow, start_up
 from discover.protocols.control import steady_rates
 from discover.simulate import SimulationError, simulate
@@ -42,32 +38,6 @@ def test_a_steady_state_is_where_a_start_up_ends(kind):
     found = simulate(giesekus(), flow, COUNTED).components
     recorded = found[:, 3] if kind == "shear" else found[:, 0] - found[:, 1]
     np.testing.assert_allclose(recorded, exact, rtol=1e-6)  # scipy's tolerance over 40 times
-
-
-def test_a_steady_state_follows_the_mobility_as_its_differences_do():
-    flow = steady_rates(np.array([3.0]))
-    ((_, grids),) = lay_out([flow], [COUNTED[:1]]).parts
-    grid = jax.tree.map(lambda leaf: leaf[0], grids)
-
-    @jax.jit
-    def stress(mobility):
-        fluid = Fluid(Giesekus(mobility), MODULUS, TIME)
-        return observed_on_grid(fluid, flow, grid)[0]
-
-    step = 1e-4  # the difference errs by its square
-    expected = (stress(MOBILITY + step) - stress(MOBILITY - step)) / (2.0 * step)
-    for derivative in (jax.jacfwd(stress), jax.jacrev(stress)):
-        np.testing.assert_allclose(jax.jit(derivative)(MOBILITY), expected, rtol=1e-6, atol=1e-9)
-
-
-def test_a_batch_holds_what_goes_on_in_time_and_what_is_steady_in_the_order_of_its_runs():
-    times = np.linspace(0.0, 40.0, 5)
-    flows = [start_up(1.0), steady_rates(RATES), start_up(30.0)]
-    runs = [bare_run(*pair) for pair in zip(flows, (times, COUNTED, times), strict=True)]
-    (found,) = observed([giesekus()], make_batch(runs))
-    # every start-up ends in the steady state of its rate, exp(−40) away
-    np.testing.assert_allclose(found[0, 4], found[1, 1], rtol=1e-6)
-    np.testing.assert_allclose(found[2, 4], found[1, 2], rtol=1e-6)
 
 
 def test_a_law_without_a_steady_state_says_so():

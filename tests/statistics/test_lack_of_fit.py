@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discover.statistics import holds_signal, lack_of_fit
+from discover.statistics import lack_of_fit
 from discover.statistics.noise import whiteness
 from discover.statistics.residual import Expectation
 
@@ -20,9 +20,6 @@ def correlated(rho, seed, n=SAMPLES):
     return drawn
 
 
-LOUD_START = 1.0 + 15.0 * np.exp(-TIMES)
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_a_residual_that_repeats_every_cycle_is_no_noise_though_the_start_is_louder(noise):
     # third harmonic of a nonlinear fluid, and the transient of a start that was none
@@ -30,15 +27,6 @@ def test_a_residual_that_repeats_every_cycle_is_no_noise_though_the_start_is_lou
     found = lack_of_fit([left], [WAVE])
     assert found.verdict == "unexplained"
     assert found.noise < 0.02
-
-
-@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.9])
-def test_noise_with_a_loud_start_is_noise(correlation):
-    verdicts = [
-        lack_of_fit([0.3 * LOUD_START * correlated(correlation, seed)], [WAVE]).verdict
-        for seed in range(20)
-    ]
-    assert verdicts.count("explained") >= 19
 
 
 @pytest.mark.parametrize(("correlation", "doubted"), [(0.0, False), (0.85, True)])
@@ -64,6 +52,7 @@ def test_spikes_once_a_cycle_are_found_by_the_cycle():
 
 
 PROPORTIONAL = np.abs(np.sin(TIMES)) + 0.1
+LOUD_START = 1.0 + 15.0 * np.exp(-TIMES)
 LOUDER_LATER = 1.0 + 4.0 * (TIMES > 30.0)
 
 
@@ -73,6 +62,7 @@ LOUDER_LATER = 1.0 + 4.0 * (TIMES > 30.0)
         *((rho, np.ones(SAMPLES)) for rho in (0.0, 0.6, 0.9)),
         *((rho, PROPORTIONAL) for rho in (0.0, 0.6)),
         *((rho, LOUDER_LATER) for rho in (0.0, 0.9)),
+        *((rho, LOUD_START) for rho in (0.0, 0.6, 0.9)),
     ],
 )
 def test_noise_of_any_size_is_rarely_taken_for_structure(correlation, size):
@@ -99,55 +89,11 @@ def test_outliers_are_counted_and_do_not_vote(share):
     assert clean.noise == pytest.approx(0.1 / 7.07, rel=0.2)
 
 
-# what was imposed: three start-ups and an oscillation
-RATES = [np.full(SAMPLES, 0.3), np.full(SAMPLES, 1.0), np.full(SAMPLES, 3.0), np.cos(TIMES)]
-
-
-def records(answer, noise, seed=0, correlation=0.0):
-    """Return records of what answers to the rates, with noise relative to the largest of them."""
-    exact = [answer(rate) for rate in RATES]
-    size = max(np.max(np.abs(one)) for one in exact) or 1.0
-    return [
-        one + noise * size * correlated(correlation, 10 * seed + i) for i, one in enumerate(exact)
-    ]
-
-
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("constant", [0.0, 42.0], ids=["noise", "dead"])
-@pytest.mark.parametrize("correlation", [0.0, 0.6])
-def test_noise_about_a_constant_is_no_signal(seed, constant, correlation):
-    drawn = records(lambda rate: constant + 0.0 * rate, 0.05, seed, correlation)
-    assert not holds_signal(drawn, RATES)
-    # nothing that a model says of them explains them
-    said = lack_of_fit([constant - record for record in drawn], drawn, rates=RATES)
-    assert said.verdict == "no_signal"
-
-
-@pytest.mark.parametrize(
-    ("answer", "noise"),
-    [
-        (lambda rate: 7.0 * rate, 0.05),  # Newtonian, steady at once
-        (lambda rate: 7.0 * rate + 1000.0, 0.001),  # with a large offset
-        (lambda rate: rate * -np.expm1(-TIMES), 0.3),  # weak
-        (lambda rate: 2.0 * np.sign(rate), 0.05),  # dry friction
-    ],
-    ids=["newtonian", "offset", "weak", "friction"],
-)
-def test_what_answers_to_the_rate_is_a_signal(answer, noise):
-    assert holds_signal(records(answer, noise), RATES)
-
-
 def test_what_looks_like_correlated_noise_is_as_large_as_all_that_is_left():
     residual, record = 0.3 * correlated(0.85, 0), WAVE
     found = lack_of_fit([residual], [record])
     assert found.verdict == "explained"
     assert found.noise == pytest.approx(np.sqrt(np.mean(residual**2)) / 7.07, rel=0.1)
-
-
-def test_one_steady_flow_does_not_tell_a_constant_from_an_answer():
-    steady = [42.0 + correlated(0.0, 0)]
-    assert holds_signal(steady, RATES[:1])
-    assert not holds_signal([correlated(0.0, 0)], RATES[:1])
 
 
 def test_a_model_that_misses_all_of_a_record_explains_nothing():

@@ -6,49 +6,36 @@ from independent import Giesekus, Modes, UpperConvectedMaxwell, oscillation, sta
 from independent.noise import correlated, proportional, rms, white
 
 from discover.statistics import lack_of_fit
-from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
 from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
-from discover.statistics.residual import Expectation, judging, noise_floor, tells_noise
+from discover.statistics.residual import Expectation, fast_part, noise_floor
 
 RUNS, SAMPLES = 6, 60
-WEIGHT = np.full((RUNS, SAMPLES), 1 / np.sqrt(SAMPLES))
 PHASE = np.linspace(0.0, 6.0, SAMPLES)
 
 
-def is_noise(residual, weight):
-    return noise_probability(residual, weight) > SIGNIFICANCE
+def probability_of(rows):
+    return noise_probability(rows, [np.ones_like(row) for row in rows])
 
 
-def floor_and_explained(residual, weight, **budget):
-    """Return the noise of a residual, and whether a complete model may leave it."""
-    rows, budget = judging(weight), Expectation(**budget)
-    residual, weight = residual[rows], weight[rows]
-    probability = noise_probability(residual, weight)
-    floor = noise_floor(residual, weight, probability)
-    noise = floor if budget.noise is None else budget.noise
-    return floor, budget.explains(residual, weight, probability, noise)
+def is_noise(rows):
+    return probability_of(rows) > SIGNIFICANCE
 
 
-def explained(residual, weight=None, **budget):
-    return floor_and_explained(residual, WEIGHT if weight is None else weight, **budget)[1]
+def explained(rows, **budget):
+    """Return whether a complete model may leave rows."""
+    budget, probability = Expectation(**budget), probability_of(rows)
+    noise = noise_floor(rows, probability) if budget.noise is None else budget.noise
+    return budget.explains(rows, probability, noise)
 
 
-def floor_of(residual, weight):
-    return floor_and_explained(residual, weight)[0]
+def floor_of(rows):
+    return noise_floor(rows, probability_of(rows))
 
 
 def noise(correlation=0.0, seed=0, size=0.01):
     lot, still = np.random.default_rng(seed), np.ones(SAMPLES)
-    drawn = np.array([correlated(still, size, correlation, lot) - still for _ in range(RUNS)])
-    return drawn / np.sqrt(SAMPLES)
-
-
-@pytest.mark.parametrize("correlation", [pytest.param(0.0, marks=pytest.mark.slow), 0.6])
-def test_noise_is_rarely_taken_for_structure(correlation):
-    taken = [not is_noise(noise(correlation, seed), WEIGHT) for seed in range(100)]
-    # significance 0.001: more than 3 of 100 has a probability below 1e-5
-    assert sum(taken) <= 3
+    return [correlated(still, size, correlation, lot) - still for _ in range(RUNS)]
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
@@ -58,24 +45,24 @@ def test_noise_is_rarely_taken_for_structure(correlation):
     ids=["smooth", "hum", "friction", "decay"],
 )
 def test_a_pattern_three_times_the_noise_is_structure(pattern, correlation):
-    pattern = 0.03 * pattern / np.sqrt(np.mean(pattern**2)) / np.sqrt(SAMPLES)
-    missed = [is_noise(noise(correlation, seed) + pattern, WEIGHT) for seed in range(20)]
+    pattern = 0.03 * pattern / np.sqrt(np.mean(pattern**2))
+    missed = [is_noise([r + pattern for r in noise(correlation, seed)]) for seed in range(20)]
     assert sum(missed) == 0
 
 
 def test_runs_of_a_few_samples_say_nothing():
-    assert noise_probability(np.ones((3, 7)), np.ones((3, 7))) is None
+    assert probability_of(np.ones((3, 7))) is None
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
 def test_the_floor_is_the_size_of_the_noise_correlated_or_not(correlation):
     # 360 samples, of which the correlation leaves 90: 7 % standard error
-    assert floor_of(noise(correlation), WEIGHT) == pytest.approx(0.01, rel=0.2)
+    assert floor_of(noise(correlation)) == pytest.approx(0.01, rel=0.2)
 
 
 def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
-    smooth = np.tile(0.02 * np.sin(PHASE), (RUNS, 1)) / np.sqrt(SAMPLES)
-    left = noise() + smooth
+    smooth = 0.02 * np.sin(PHASE)
+    left = [row + smooth for row in noise()]
     assert not explained(left)
     assert explained(left, linear_error=0.02)
     # an error of the linear data that is far smaller does not excuse it
@@ -87,41 +74,47 @@ def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
 
 
 def test_what_repeated_runs_differ_by_may_have_a_pattern_of_its_size_and_no_more():
-    smooth = np.tile(0.02 * np.sin(PHASE), (RUNS, 1)) / np.sqrt(SAMPLES)
-    left = noise() + smooth  # the pattern is 1.4 %, the noise 1 %
+    smooth = 0.02 * np.sin(PHASE)
+    left = [row + smooth for row in noise()]  # the pattern is 1.4 %, the noise 1 %
     assert explained(left, repeat_error=0.02)
     assert not explained(left, repeat_error=0.01)
     # what is left may be as large as before, and no pattern beyond it
-    assert not explained(noise() + 3.0 * smooth, repeat_error=0.02)
+    assert not explained([row + 3.0 * smooth for row in noise()], repeat_error=0.02)
 
 
 def with_a_short_run(samples, miss):
-    """Return noise of two long runs and a shorter one that is missed by so much, with weights."""
-    residual, weight = noise()[:3].copy(), WEIGHT[:3].copy()
-    residual[2], weight[2] = 0.0, 0.0
-    residual[2, :samples], weight[2, :samples] = miss / np.sqrt(samples), 1.0 / np.sqrt(samples)
-    return residual, weight
+    """Return what is said of noise of two long runs and a shorter one that is missed by so much."""
+    rows = [*noise()[:2], np.full(samples, miss)]
+    return lack_of_fit(rows, [np.ones(len(row)) for row in rows])
 
 
 @pytest.mark.parametrize("samples", [1, 3, 6])
 def test_a_run_of_a_few_samples_decides_nothing_beside_longer_ones(samples):
-    residual, weight = with_a_short_run(samples, 0.3)
-    assert judging(weight).tolist() == [True, True, False]
-    assert floor_of(residual, weight) == pytest.approx(0.01, rel=0.2)
-    assert explained(residual, weight)
+    left = with_a_short_run(samples, 0.3)
+    assert left.noise == pytest.approx(0.01, rel=0.2)
+    assert left.verdict == "explained"
 
 
 def test_the_size_of_a_run_too_short_to_be_tested_is_no_sign_of_noise():
-    residual, weight = with_a_short_run(15, 0.3)
-    assert floor_of(residual, weight) == pytest.approx(0.01, rel=0.2)
-    assert not explained(residual, weight)
-    residual, weight = with_a_short_run(15, 0.01)
-    assert explained(residual, weight)
+    left = with_a_short_run(15, 0.3)
+    assert left.noise == pytest.approx(0.01, rel=0.2)
+    assert left.verdict == "unexplained"
+    assert with_a_short_run(15, 0.01).verdict == "explained"
 
 
-def test_runs_that_are_all_of_a_few_samples_do_not_say_how_noisy_they_are():
-    assert not tells_noise(np.ones((3, 6)))
-    assert tells_noise(np.ones((3, 7)))
+@pytest.mark.parametrize(("samples", "verdict"), [(6, "unexplained"), (7, "explained")])
+def test_runs_that_are_all_of_a_few_samples_do_not_say_how_noisy_they_are(samples, verdict):
+    assert (
+        lack_of_fit([0.01 * (-1.0) ** np.arange(samples)] * 3, [np.ones(samples)] * 3).verdict
+        == verdict
+    )
+
+
+def test_the_noise_of_a_smooth_misfit_is_not_its_size():
+    noise = 0.01 * np.random.default_rng(0).standard_normal(400)
+    trend = 0.2 * np.sin(np.linspace(0, 6, 400))
+    assert fast_part(noise) == pytest.approx(0.01, rel=0.2)
+    assert fast_part(noise + trend) == pytest.approx(0.01, rel=0.2)
 
 
 TIMES = np.linspace(0.33, 5.0, 15)
@@ -131,15 +124,14 @@ def noise_short(generator, runs=6, samples=15):
     return 0.01 * generator.standard_normal((runs, samples))
 
 
-def structured(residual, weight):
-    probability = noise_probability(residual, weight)
+def structured(rows):
+    probability = probability_of(rows)
     assert probability is not None
     return probability <= 0.01
 
 
 def test_plain_noise_of_short_runs_is_taken_for_structure_as_seldom_as_the_level_says():
-    weight = np.ones((6, 15))
-    taken = sum(structured(noise_short(np.random.default_rng(seed)), weight) for seed in range(300))
+    taken = sum(structured(noise_short(np.random.default_rng(seed))) for seed in range(300))
     # 1 % of 300, within three standard deviations of a binomial count
     assert taken <= 3 + 3 * np.sqrt(300 * 0.01 * 0.99)
 
@@ -147,7 +139,7 @@ def test_plain_noise_of_short_runs_is_taken_for_structure_as_seldom_as_the_level
 def test_few_short_runs_of_noise_are_explained():
     records = [np.ones(12)] * 3
     verdicts = [
-        what_is_left(list(noise_short(np.random.default_rng(seed), 3, 12)), records).verdict
+        lack_of_fit(list(noise_short(np.random.default_rng(seed), 3, 12)), records).verdict
         for seed in range(60)
     ]
     # 1 % of 60: more than 4 has a probability below 1e-3
@@ -160,7 +152,7 @@ def test_six_runs_of_fifteen_samples_show_a_misfit_as_large_as_their_noise():
     misfit *= 0.01 / np.sqrt(np.mean(misfit**2))
     records = [-np.expm1(-TIMES)] * 6
     found = [
-        what_is_left(list(noise_short(np.random.default_rng(seed)) + misfit), records).verdict
+        lack_of_fit(list(noise_short(np.random.default_rng(seed)) + misfit), records).verdict
         for seed in range(20)
     ]
     # a misfit that is seen nine times in ten is missed more than five times of 20 once in 10,000
@@ -171,17 +163,17 @@ def test_what_short_runs_cannot_tell_is_said():
     # no larger than a pattern of noise may be, and yet a pattern
     bent = 0.008 * np.cos(np.linspace(0.0, np.pi, 15))
     residuals = list(bent + noise_short(np.random.default_rng(1)))
-    assert "do not tell correlated noise" in what_is_left(residuals, [np.ones(15)] * 6).reason
+    assert "do not tell correlated noise" in lack_of_fit(residuals, [np.ones(15)] * 6).reason
     # changes from sample to sample, as noise does
-    few = what_is_left([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
+    few = lack_of_fit([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
     assert few.probability is None
     assert "too few samples" in few.reason
     # 8 samples of plain noise look like more than noise one time in five
     row = noise_short(np.random.default_rng(0), 1, 8)[0] + np.linspace(-0.1, 0.1, 8)
-    open_ = what_is_left([row], [np.ones(8)])
+    open_ = lack_of_fit([row], [np.ones(8)])
     assert open_.verdict == "unexplained"
     assert "hardly tell" in open_.reason
-    assert "hardly tell" not in what_is_left([row] * 3, [np.ones(8)] * 3).reason
+    assert "hardly tell" not in lack_of_fit([row] * 3, [np.ones(8)] * 3).reason
 
 
 def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():
@@ -191,25 +183,21 @@ def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():
             drawn[i] = 0.7 * drawn[i - 1] + np.sqrt(0.51) * drawn[i]
         return drawn
 
-    weight = np.zeros((7, 200))
-    weight[0], weight[1:, :15] = 1.0, 1.0
     alone, together = 0, 0
     for seed in range(20):
         generator = np.random.default_rng(seed)
-        residual = np.zeros((7, 200))
-        residual[0] = correlated(200, generator)
-        residual[1:, :15] = [correlated(15, generator) for _ in range(6)]
-        alone += structured(residual[1:], weight[1:])
-        together += structured(residual, weight)
+        long = correlated(200, generator)
+        short = [correlated(15, generator) for _ in range(6)]
+        alone += structured(short)
+        together += structured([long, *short])
     assert alone >= 18
     # 1 % of 20: more than 3 has a probability below 1e-4
     assert together <= 3
 
 
 def test_the_noise_of_short_runs_is_their_size_where_nothing_speaks_against_it():
-    residual = noise_short(np.random.default_rng(1)) / np.sqrt(15)
     # 90 samples: 7 % standard error
-    assert floor_of(residual, np.full((6, 15), 1 / np.sqrt(15))) == pytest.approx(0.01, rel=0.2)
+    assert floor_of(noise_short(np.random.default_rng(1))) == pytest.approx(0.01, rel=0.2)
 
 
 GROWTH, WAVE = np.geomspace(0.05, 10.0, 60), np.linspace(0.0, 12.0, 121)

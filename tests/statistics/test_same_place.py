@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics import lack_of_fit
 from discover.statistics.noise.whiteness import noise_probability, same_place_probability
 from discover.statistics.residual import Expectation, noise_floor
 
 NOISE, SAMPLES = 0.01, 61
-WEIGHT = np.full((5, SAMPLES), 1.0 / np.sqrt(SAMPLES))
 
 
 def noise(seed: int) -> np.ndarray:
@@ -26,7 +25,7 @@ def newtonian_missed_at_the_start(seed: int = 0) -> tuple[np.ndarray, np.ndarray
 @pytest.mark.parametrize("runs", [1, 5])
 def test_a_start_that_every_run_misses_is_no_noise(runs):
     residual, measured = newtonian_missed_at_the_start()
-    left = what_is_left([*residual[:runs]], [*measured[:runs]])
+    left = lack_of_fit([*residual[:runs]], [*measured[:runs]])
     assert left.verdict == "unexplained"
     assert left.outliers == 0
     # of 61 samples in one run the size is known to 10 %, to half of that in five
@@ -35,7 +34,7 @@ def test_a_start_that_every_run_misses_is_no_noise(runs):
 
 def test_without_the_start_noise_is_left():
     residual, measured = newtonian_missed_at_the_start()
-    assert what_is_left([*residual[:, 1:]], [*measured[:, 1:]]).verdict == "explained"
+    assert lack_of_fit([*residual[:, 1:]], [*measured[:, 1:]]).verdict == "explained"
 
 
 def test_a_loud_start_that_differs_from_run_to_run_is_noise():
@@ -57,7 +56,7 @@ def test_knocks_at_different_places_are_outliers_and_at_one_place_structure(
 ):
     left = noise(1)
     left[np.arange(5), places] += 0.5
-    told = what_is_left([*left], [*(1.0 - left)])
+    told = lack_of_fit([*left], [*(1.0 - left)])
     assert (told.verdict, told.outliers) == (verdict, outliers)
 
 
@@ -70,10 +69,9 @@ def test_few_samples_do_not_hide_a_misfit_in_the_noise():
     floors = []
     for seed in range(20):
         noise = NOISE * np.random.default_rng(seed).standard_normal((4, 8))
-        weight = np.full((4, 8), 1.0 / np.sqrt(8.0))
-        residual = (missed + noise) * weight
-        probability = noise_probability(residual, weight)
-        floors.append(noise_floor(residual, weight, probability))
-        assert not Expectation().explains(residual, weight, probability, floors[-1])
+        rows = missed + noise
+        probability = noise_probability(rows, np.ones_like(rows))
+        floors.append(noise_floor([*rows], probability))
+        assert not Expectation().explains([*rows], probability, floors[-1])
     # 16 differences tell it to 40 %, the mean of 20 draws to 9 %; the bends of the misfit add some
     assert np.mean(floors) < 1.5 * NOISE

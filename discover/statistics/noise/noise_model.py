@@ -1,8 +1,13 @@
 """Sizes of sequences: root mean square, samples that count, how often a value is read."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
+
+Rows = Float[np.ndarray, "runs n"] | Sequence[Float[np.ndarray, " _"]]
+"""One sequence for each run."""
 
 HALF_BAND = 1.96
 """Standard deviations of half of a 95 % band."""

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import lfilter
-from scipy.stats import chi2, gamma
+from scipy.stats import chi2
 
+from discover.statistics.noise.smooth_misfit import exceeded, redrawn
 from discover.statistics.noise.whiteness import FEWEST_TESTED
 
 _CORRELATIONS = np.linspace(0.0, 0.95, 39)
-_DRAWS = 200
 _PLAIN = 0.05  # probability above which nothing needs to be drawn
 
 
@@ -40,28 +39,10 @@ def same_correlation_probability(
         ratio, common = _ratio(each, exponents)
         own = float(chi2.sf(ratio[0], len(told) - 1))
         if own <= _PLAIN:
-            own = _by_lot([row for row, _ in told], common[0] ** exponents, exponents, ratio[0])
+            drawn = redrawn([row for row, _ in told], common[0] ** exponents)
+            own = exceeded(ratio[0], _ratio(drawn, exponents)[0])
         probability = own if exponents is not powers else max(probability, own)
     return probability
-
-
-def _by_lot(
-    rows: Sequence[np.ndarray], correlations: np.ndarray, exponents: np.ndarray, ratio: float
-) -> float:
-    """Return how often signs drawn by lot give as large a ratio."""
-    generator = np.random.default_rng(0)
-    drawn = []
-    for row, rho in zip(rows, correlations, strict=True):
-        new = row - rho * np.append(0.0, row[:-1])
-        new[0] *= np.sqrt(1.0 - rho**2)
-        signs = generator.choice([-1.0, 1.0], (_DRAWS, len(row))) * new
-        signs[:, 0] /= np.sqrt(1.0 - rho**2)
-        drawn.append(np.asarray(lfilter([1.0], [1.0, -rho], signs)))
-    by_chance, _ = _ratio(drawn, exponents)
-    mean, variance = float(np.mean(by_chance)), float(np.var(by_chance))
-    if variance <= 0.0:
-        return 1.0
-    return float(gamma.sf(ratio, mean**2 / variance, scale=variance / mean))
 
 
 def _ratio(

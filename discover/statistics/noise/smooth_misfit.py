@@ -36,15 +36,27 @@ def smooth_misfit_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     gain, rho = _gain([row[None] for row in rows])
     if gain[0] < _PLAIN:
         return 1.0
-    generator = np.random.default_rng(0)
-    drawn = []
-    for row in rows:
-        new = row - rho[0] * np.append(0.0, row[:-1])
+    return exceeded(gain[0], _gain(redrawn(rows, [rho[0]] * len(rows)))[0])
+
+
+def redrawn(
+    rows: Sequence[Float[np.ndarray, " _"]], correlations: Sequence[float] | Float[np.ndarray, " _"]
+) -> list[Float[np.ndarray, "draws _"]]:
+    """Return draws of each row: first-order noise, the signs of whose innovations are drawn."""
+    generator, drawn = np.random.default_rng(0), []
+    for row, rho in zip(rows, correlations, strict=True):
+        new = row - rho * np.append(0.0, row[:-1])
         signs = generator.choice([-1.0, 1.0], (_DRAWS, len(row)))
-        drawn.append(lfilter([1.0], [1.0, -rho[0]], signs * new))
-    by_chance = _gain(drawn)[0]
+        drawn.append(np.asarray(lfilter([1.0], [1.0, -rho], signs * new)))
+    return drawn
+
+
+def exceeded(value: float, by_chance: Float[np.ndarray, " draws"]) -> float:
+    """Return the probability of so large a value, by a gamma distribution of draws."""
     mean, variance = float(np.mean(by_chance)), float(np.var(by_chance))
-    return float(gamma.sf(gain[0], mean**2 / variance, scale=variance / mean))
+    if variance <= 0.0:
+        return 1.0
+    return float(gamma.sf(value, mean**2 / variance, scale=variance / mean))
 
 
 def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):

@@ -12,7 +12,7 @@ from scipy.ndimage import median_filter
 from scipy.special import gammaincc, ndtr
 from scipy.stats import t as student
 
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise.noise_model import Rows, rms
 from discover.statistics.noise.smooth_misfit import LARGEST_CORRELATION, smooth_misfit_probability
 
 _STANDS_OUT = 6.0  # robust standard deviations of the neighbourhood
@@ -86,9 +86,9 @@ _FEWEST_CYCLES = 2
 
 
 def noise_probability(
-    residual: Float[np.ndarray, "runs n"],
-    weight: Float[np.ndarray, "runs n"],
-    measured: Float[np.ndarray, "runs n"] | None = None,
+    residual: Rows,
+    weight: Rows,
+    measured: Rows | None = None,
     further: Sequence[float] = (),
 ) -> float | None:
     """Return the probability of residuals as structured as these, if they are noise.
@@ -111,7 +111,7 @@ def noise_probability(
     correlation of the longer runs, or none. The smallest probability counts as often as there are
     tests; None if all runs together are too short.
 
-    `residual`: of each run, in any unit, padded. `weight`: positive where there is a sample.
+    `residual`: of each run, in any unit, padded or not. `weight`: positive where there is a sample.
     `measured`: the records, by which cycles are found. `further`: probabilities by other tests of
     the longer runs.
     """
