@@ -17,6 +17,7 @@ from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
 from discover.linear_algebra_threads import in_one_thread
+from discover.statistics.noise.whiteness import noise_probability
 
 NONE = 0.3
 """Prior probability that something has no name; on development seeds of judged worlds anything from
@@ -24,6 +25,10 @@ NONE = 0.3
 
 WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
+
+UNLIKE_NOISE = 0.02
+"""Prior probability of what neither a candidate nor a smooth curve follows: of a residual with a
+probability of one in a thousand as noise it makes even odds."""
 
 _MOST = 8
 _WITH_DISCREPANCY = 2
@@ -224,6 +229,7 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     known = [*done["whole"][2], *([before.left] if before.left else [])] if before else []
     beside = [_left_by(whole, fit, known) for fit in judged[:_WITH_DISCREPANCY]]
     nothing = [whole.rank(one.fit) + one.log_factor + np.log(NONE / (1.0 - NONE)) for one in beside]
+    nothing += [whole.rank(fit) + _unlike_noise(whole.fitter, fit) for fit in judged[:1]]
     total = float(np.logaddexp.reduce([*logs, *nothing]))
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
     unexplained = float(np.exp(np.logaddexp.reduce(nothing) - total)) + lost if nothing else 1.0
@@ -237,7 +243,9 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     if not near:
         return found
     found.left = left = _left_by(search, near[0], known)
-    none = own[0] + left.log_factor + np.log(NONE / (1.0 - NONE))
+    none = own[0] + np.logaddexp(
+        left.log_factor + np.log(NONE / (1.0 - NONE)), _unlike_noise(search.fitter, near[0])
+    )
     enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > NEGLIGIBLE
     # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is
     if enough and none > among:
@@ -269,6 +277,28 @@ def _left_by(search: Search, fit: Fit, known: Sequence[Discrepancy]) -> Discrepa
     least = smallest(search, fit)
     same = (one for one in known if one.fit is fit and one.smallest == least)
     return next(same, None) or Discrepancy(search.fitter, fit, least)
+
+
+def probability_as_noise(fitter: Fitter, fit: Fit) -> float | None:
+    """Return the probability of what a fit leaves, if it is noise; None of too few samples."""
+    rows = fitter.rows
+    own = [rows.run == i for i in range(len(rows.runs))]
+    left = (fitter.record(fit) - rows.recorded) / rows.size
+    one = np.ones(len(rows))
+    return noise_probability(*([each[at] for at in own] for each in (left, one, rows.recorded)))
+
+
+def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
+    """Return the log odds of what no curve follows either: of what a fit leaves, were it noise.
+
+    A probability p of it as noise speaks against noise by a factor of −1/(e p ln p) at most
+    [Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62].
+    """
+    p = probability_as_noise(fitter, fit)
+    if p is None or p >= np.exp(-1.0):
+        return -np.inf
+    p = max(p, 1e-300)
+    return float(np.log(-1.0 / (np.e * p * np.log(p)) - 1.0) + np.log(UNLIKE_NOISE))
 
 
 def _foretelling(posterior: Posterior) -> tuple[tuple[Fit, float], ...]:
