@@ -32,8 +32,6 @@ from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
 
 if TYPE_CHECKING:
-    import xarray
-
     from discover.equations import Equation
     from discover.laws.multimode import Fluid
     from discover.learners.results import LearnerResult
@@ -210,34 +208,6 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         except (KeyError, TypeError) as error:
             raise file.damaged(error) from None
         return estimator
-
-    def to_xarray(self, X: Iterable[Run] | None = None, seed: int = 0) -> "xarray.Dataset":
-        """Return what the data leave open, with named dimensions, for xarray and ArviZ.
-
-        Of `TensorSINDy` 1,000 draws of the coefficients given its terms, dimensions ``chain``,
-        ``draw``, ``term``. Of `TBNNUDE` what each network predicts, dimensions ``member``,
-        ``sample``: members are no draws from a posterior.
-
-        Parameters
-        ----------
-        X
-            For networks the runs to predict, by default those that were fitted.
-        seed
-            Of the draws.
-
-        Raises
-        ------
-        NotFittedError
-            If nothing was fitted yet.
-        InputError
-            If there is nothing to draw, or xarray is not installed (extra ``xarray``).
-        """
-        from discover.learners.results import labelled_draws, labelled_members
-
-        check_is_fitted(self, "fluid_")
-        if hasattr(self, "members_"):
-            return labelled_members(self, X)
-        return labelled_draws(self, seed)
 
     def predict(self, X: Iterable[Run]) -> Float[np.ndarray, " rows"]:
         """Return what is recorded at the samples of all runs, one run after the other.

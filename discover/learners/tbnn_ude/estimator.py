@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Float
-from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
@@ -33,7 +31,6 @@ from discover.learners.tbnn_ude.problem import (
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
-from discover.protocols.protocol import FlowProtocol
 from tensor_library import TENSOR_NAMES, TermLibrary
 
 RECIPES = ("default", "thorough", "paper")
@@ -195,19 +192,6 @@ class TBNNUDE(RunPrediction):
             message="; ".join(filter(None, (best.message, trained[0].left_out, fitted, shortened))),
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
-
-    def predict_members(
-        self, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
-    ) -> ensemble.MemberPredictions:
-        """Return σ12, N1 and N2 of every member in a flow, with their bands.
-
-        Parameters
-        ----------
-        protocol, times
-            Any flow, also one that no training saw; times in s, shape (n,), from 0 on.
-        """
-        check_is_fitted(self, "ensemble_fluids_")
-        return ensemble.member_predictions(self.ensemble_fluids_, protocol, times)
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):
