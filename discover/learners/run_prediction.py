@@ -20,7 +20,6 @@ from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
 from discover.learners.settings import (
     ARITHMETIC,
-    KnownPart,
     check_settings,
     known_part,
     require_known_rate,
@@ -77,7 +76,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         self._check_parameters()
         known = known_part(self)
         # once, for it may be read only once
-        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
+        runs = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
         require_signal(runs)
         require_known_rate(known, runs)
         self._left = None
@@ -261,7 +260,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         """Refuse parameters that only this learner has."""
 
     @abstractmethod
-    def _learn(self, runs: list[Run], known: KnownPart) -> None:
+    def _learn(self, runs: list[Run], known: "Fluid") -> None:
         """Find the law: set the attributes of the fit but those that tell of the runs."""
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:

@@ -223,7 +223,7 @@ def test_refitting_forgets(giesekus):
     ("parameters", "message"),
     [
         ({"optimizer": "magic"}, "Unknown optimizer"),
-        ({"modulus": -1.0}, "modulus must be positive"),
+        ({"modulus": -1.0}, "modulus of a fluid must be positive"),
         ({"modulus": [1.0, 2.0]}, "one value for each mode"),
         ({"library": ["sigma"]}, "TermLibrary"),
         ({"max_terms": 0}, "max_terms"),

@@ -18,7 +18,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
-from discover.learners.settings import KnownPart, PerMode, default_library
+from discover.learners.settings import PerMode, default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
@@ -120,18 +120,18 @@ class TBNNUDE(RunPrediction):
     base: Fluid | None = None
     solvent_viscosity: float = 0.0
 
-    def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
+    def _learn(self, runs: list[Run], known: Fluid, shorten: bool = True) -> None:
         started = time.perf_counter()
         recipe = self._recipe()
         whole = held = problem = _problem(runs, known)
         followed, fitted = runs, ""
         if isinstance(recipe, DefaultRecipe):
-            if shorten and known.linear_relaxation:
+            if shorten and known.law.linear_relaxation:
                 followed, problem = shorter_where_it_pays(
                     runs,
                     whole,
                     lambda shorter: _problem(shorter, known),
-                    known.relaxation_time,
+                    np.asarray(known.relaxation_time),
                     recipe.affordable,
                 )
             held = problem
@@ -153,9 +153,9 @@ class TBNNUDE(RunPrediction):
         self.ensemble_ = agreement
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
-        modes = np.asarray(known.modulus), problem.relaxation_time, float(known.solvent_viscosity)
-        self.fluid_ = Fluid(best.law, *modes)
-        self.ensemble_fluids_ = [Fluid(law, *modes) for law in members]
+        modes = replace(known, modulus_covariance=None)
+        self.fluid_ = replace(modes, law=best.law)
+        self.ensemble_fluids_ = [replace(modes, law=law) for law in members]
         shortened = ""
         if followed is not runs:
             recorded = self._predict_runs(runs), self._predict_runs(list(followed))
@@ -208,7 +208,7 @@ class TBNNUDE(RunPrediction):
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
     def _train_all(
-        self, problem: TrainingProblem, keys, recipe, known: KnownPart
+        self, problem: TrainingProblem, keys, recipe, known: Fluid
     ) -> tuple[list[Trained], str]:
         """Return all members, and how they came about."""
         say = by_steps(self.progress)
@@ -225,11 +225,11 @@ class TBNNUDE(RunPrediction):
         others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
-    def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart, say) -> Trained:
-        relaxes = known.linear_relaxation
+    def _train(self, problem: TrainingProblem, key, recipe, known: Fluid, say) -> Trained:
+        relaxes, below = known.law.linear_relaxation, law_below(known)
         if isinstance(recipe, DefaultRecipe):
-            return train_default(problem, key, relaxes, recipe, say, known.law)
-        law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=known.law)
+            return train_default(problem, key, relaxes, recipe, say, below)
+        law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=below)
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, misfit, True, message)
@@ -239,11 +239,10 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> TrainingProblem:
-    return make_problem(
-        runs, known.modulus, known.relaxation_time, solvent_viscosity=known.solvent_viscosity,
-        known_relaxation=known.linear_relaxation, base=known.law, **limits,
-    )  # fmt: skip
+def _problem(runs: Sequence[Run], known: Fluid, **limits: float) -> TrainingProblem:
+    modes = np.asarray(known.modulus), np.asarray(known.relaxation_time)
+    viscosity = float(known.solvent_viscosity)
+    return make_problem(runs, *modes, solvent_viscosity=viscosity, base=known.law, **limits)
 
 
 _WORTH_TRAINING_ON = 1.5
@@ -251,7 +250,7 @@ _WORTH_TRAINING_ON = 1.5
 
 
 def _rougher(
-    problem: TrainingProblem, runs: Sequence[Run], known: KnownPart, samples: int
+    problem: TrainingProblem, runs: Sequence[Run], known: Fluid, samples: int
 ) -> tuple[TrainingProblem, str]:
     """Return a problem of fewer samples and longer steps, and what was left out in words."""
     fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
@@ -260,7 +259,7 @@ def _rougher(
         problem = _problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
     limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
-    if limits is not None and known.linear_relaxation:
+    if limits is not None and known.law.linear_relaxation:
         rough = _problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
         if share >= _WORTH_TRAINING_ON:

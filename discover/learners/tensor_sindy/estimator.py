@@ -1,7 +1,7 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import KnownPart, PerMode, check_library, default_library
+from discover.learners.settings import PerMode, check_library, default_library, law_below
 from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.search import (
@@ -123,7 +123,7 @@ class TensorSINDy(RunPrediction):
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
     random_state: int = 0
 
-    def _learn(self, runs: list[Run], known: KnownPart) -> None:
+    def _learn(self, runs: list[Run], known: Fluid) -> None:
         started = time.perf_counter()
         library = default_library() if self.library is None else self.library
         problem = library_problem(runs, library, known, self.use_normal_stresses)
@@ -147,10 +147,7 @@ class TensorSINDy(RunPrediction):
             for name, value in term.inner.items():
                 self.inner_[library.inner_names.index(name)] = value
         self.law_ = _law(library, search.support(chosen), self.coefficients_, self.inner_, known)
-        fluid = known.fluid
-        self.fluid_ = Fluid(
-            self.law_, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity
-        )
+        self.fluid_ = replace(known, law=self.law_, modulus_covariance=None)
         misfit, covariance = fitter.misfit(chosen), self.covariance_
         rows = len(problem.fitted)
         self.result_ = LearnerResult(
@@ -194,7 +191,7 @@ def _law(
     support: tuple[int, ...],
     coefficients: Float[np.ndarray, " n"],
     inner: Float[np.ndarray, " m"],
-    known: KnownPart,
+    known: Fluid,
 ) -> LibraryExpansion:
     smaller = library.subset(support or [0])
     used = [inner[i] for i, form in enumerate(library.forms) if form in smaller.forms]
@@ -202,6 +199,6 @@ def _law(
         coefficients=on_device(coefficients[list(support or [0])]),
         inner=on_device(np.array(used, float)),
         library=smaller,
-        linear_relaxation=known.linear_relaxation,
-        base=known.law,
+        linear_relaxation=known.law.linear_relaxation,
+        base=law_below(known),
     )
