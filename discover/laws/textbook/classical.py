@@ -81,7 +81,8 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = (exp(ε tr σ) − 1) σ."""
         del rate
-        return jnp.expm1(self.extensibility * trace(stress)) * stress
+        # beyond exp(60) a trial is absurd; the cap keeps it finite, to be rejected for its misfit
+        return jnp.expm1(jnp.minimum(self.extensibility * trace(stress), 60.0)) * stress
 
     def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
