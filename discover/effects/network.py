@@ -26,12 +26,10 @@ class ConvectiveConstraintRelease(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        """Return c tr(σ·γ̇)[(1 + β)σ + I]."""
         release = (1.0 + values[1]) * stress + identity_like(stress)
         return values[0] * inner(stress, rate) * release
 
     def as_terms(self, values):
-        """Return both parts."""
         c, beta = values
         return (
             LawTerm("tr(sigma.gammadot)*sigma", c * (1.0 + beta)),
@@ -70,7 +68,6 @@ class FiniteExtensibility(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        """Return q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q)."""
         inverse = values[0]
         stretch = trace(stress)
         factor = 1.0 + inverse * stretch
@@ -78,7 +75,6 @@ class FiniteExtensibility(ConstitutiveEffect):
         return inverse * stretch * stress - growth * (stress + identity_like(stress))
 
     def as_terms(self, values):
-        """Return the six terms of FENE-P."""
         return fene_p_terms(values[0])
 
 
@@ -107,7 +103,6 @@ class AddedLaw(ConstitutiveEffect):
     law: Callable[..., AbstractConstitutiveLaw] = field(kw_only=True)
 
     def extra_term(self, values, stress, rate):
-        """Return h of the law."""
         return self.law(*values).extra_term(stress, rate)
 
     def as_terms(self, values):
@@ -189,7 +184,6 @@ class StrainDamping(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        """Return n λ|γ̇| (σ + I)."""
         size = jnp.sqrt(jnp.maximum(0.5 * inner(rate, rate), _AT_REST))
         return values[0] * size * (stress + identity_like(stress))
 
@@ -233,7 +227,6 @@ class RelaxationMode(ModeEffect):
     """One more mode under the declared law   [generalised Maxwell model, Ferry 1980, ch. 1]."""
 
     def mode(self, values):
-        """Return G and λ."""
         return values[0], values[1]
 
 
@@ -266,7 +259,6 @@ class SolventViscosity(ConstitutiveEffect):
     """Adds η_s γ̇ to the stress   [Oldroyd 1950, Proc. R. Soc. A 200, 523]."""
 
     def instantaneous_stress(self, values, shear_rate):
-        """Return η_s γ̇ in Pa."""
         return values[0] * shear_rate
 
 

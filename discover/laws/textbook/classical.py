@@ -16,12 +16,10 @@ class UpperConvectedMaxwell(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = 0."""
         del rate
         return jnp.zeros_like(stress)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return ()
 
 
@@ -32,11 +30,9 @@ class JohnsonSegalman(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
         return 0.5 * self.slip_parameter * anticommutator(stress, rate)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return (LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter)),)
 
 
@@ -47,12 +43,10 @@ class Giesekus(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = α σ·σ."""
         del rate  # this law has no explicit rate dependence
         return self.mobility * square(stress)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return (LawTerm("sigma.sigma", float(self.mobility)),)
 
 
@@ -63,12 +57,10 @@ class LinearPhanThienTanner(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = ε tr(σ) σ."""
         del rate
         return self.extensibility * trace(stress) * stress
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return (LawTerm("tr(sigma)*sigma", float(self.extensibility)),)
 
 
@@ -79,13 +71,11 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = (exp(ε tr σ) − 1) σ."""
         del rate
         # beyond exp(60) a trial is absurd; the cap keeps it finite, to be rejected for its misfit
         return jnp.expm1(jnp.minimum(self.extensibility * trace(stress), 60.0)) * stress
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         inner = {"epsilon": float(self.extensibility)}
         return (LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
 
@@ -122,7 +112,6 @@ class FenePeterlin(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ, γ̇) as above."""
         limit = self.maximum_extension_squared
         trace_of_stress = trace(stress)
         factor = 1.0 + trace_of_stress / limit
@@ -133,7 +122,6 @@ class FenePeterlin(AbstractConstitutiveLaw):
         return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return fene_p_terms(1.0 / float(self.maximum_extension_squared))
 
 

@@ -20,12 +20,10 @@ class NonAffine(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return the h of the affine law and the slip."""
         slip = 0.5 * self.slip_parameter * anticommutator(stress, rate)
         return self.affine.extra_term(stress, rate) + slip
 
     def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return both as a sum of library terms."""
         slip = LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
         affine = self.affine.as_terms()
         return None if affine is None else (*affine, slip)
