@@ -10,11 +10,11 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
-from tensor_library.notation import TextNotation, printed
+from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
 
-class CodeNotation(TextNotation):
+class CodeNotation(Notation):
     """numpy, and what the other texts in Python share with it."""
 
     tensors = {"I": "unit", "sigma": "s", "gammadot": "d"}  # noqa: RUF012
