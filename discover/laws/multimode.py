@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.each_mode import over_modes, require_modes
+from discover.laws.each_mode import require_modes
 from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
@@ -211,18 +211,6 @@ class Fluid(eqx.Module):
     def rest(self) -> Float[Array, "k s"]:
         """Return the state at rest."""
         return jnp.tile(self.law.rest(), (self.n_modes, 1))
-
-    def state_rate(
-        self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
-    ) -> Float[Array, "k s"]:
-        """Return d(state)/dt in 1/s.
-
-        `state`: σ_k/G_k, dimensionless, four components with the variables behind, (k, s).
-        `velocity_gradient`: γ̇, (), or four components of L, (4,), in 1/s.
-        """
-        scaled = jnp.multiply.outer(self.relaxation_time, velocity_gradient)
-        of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), self.law)
-        return of_modes(state, scaled) / self.relaxation_time[:, None]
 
     def stress(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient

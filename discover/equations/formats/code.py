@@ -319,7 +319,8 @@ def filled(
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes=repr([(float(g), float(time)) for g, time in pairs]),
-        solvent=repr(float(equation.solvent_viscosity)), tested=_tested(equation),
+        solvent=repr(float(equation.solvent_viscosity)),
+        tested=repr(equation.tested and equation.tested.boxes),
         constants=constants or "",
         mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
         also=", variables" if variables else "", also_k=", variables[k]" if variables else "",
@@ -364,15 +365,3 @@ def _constants(equation: Equation) -> str:
 
 def _numbers(values: Sequence[float]) -> str:
     return repr([float(value) for value in values])
-
-
-def _tested(equation: Equation) -> str:
-    tested = equation.tested
-    if tested is None:
-        return "None"
-    boxes = {"learned_in": tested.learned_in, "judged_in": tested.judged_in}
-    ends = {
-        name: box and {"Wi": [*map(float, box.weissenberg)], "De": [*map(float, box.deborah)]}
-        for name, box in boxes.items()
-    }
-    return repr(ends)

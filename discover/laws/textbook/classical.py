@@ -145,6 +145,23 @@ def _written_fene_p() -> IsotropicFunction:
     return IsotropicFunction({"sigma": f - 1 - w, "I": -w}, where, {"L2": "L^{2}"})
 
 
+class NonAffine(AbstractConstitutiveLaw):
+    """A law with (ξ/2)(σ·γ̇ + γ̇·σ) added to its h   [Johnson & Segalman 1977, JNNFM 2, 255]."""
+
+    affine: AbstractConstitutiveLaw
+    slip_parameter: Float[Array, ""] = eqx.field(converter=as_parameter)  # ξ, 0 to 2
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        slip = 0.5 * self.slip_parameter * anticommutator(stress, rate)
+        return self.affine.extra_term(stress, rate) + slip
+
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
+        slip = LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
+        affine = self.affine.as_terms()
+        return None if affine is None else (*affine, slip)
+
+
 NAMED = {
     "ucm": NamedLaw(
         "upper convected Maxwell",
@@ -196,4 +213,32 @@ NAMED = {
         source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
         written=_written_fene_p,
     ),
+}
+
+
+def _with_slip(named: NamedLaw) -> NamedLaw:
+    slip = NAMED["johnson_segalman"]
+
+    def build(constant, xi) -> NonAffine:
+        return NonAffine(affine=named.build(constant), slip_parameter=xi)
+
+    def written() -> IsotropicFunction:
+        assert named.written is not None
+        assert slip.written is not None
+        affine, slipping = named.written(), slip.written()
+        return IsotropicFunction({**affine.coefficients, **slipping.coefficients}, affine.where)
+
+    return NamedLaw(
+        f"{named.title} with slip",
+        build,
+        {**named.parameters, **slip.parameters},
+        {**named.range_sources, **slip.range_sources},
+        source=f"{named.source}; {slip.source}",
+        written=written,
+    )
+
+
+NAMED |= {
+    f"{name}_non_affine": _with_slip(NAMED[name])
+    for name in ("giesekus", "ptt_linear", "ptt_exponential")
 }
