@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from differences import told_as_differences
 from independent.homogeneous import GiesekusFluid
 
 from discover.dataset import Run
@@ -42,19 +43,8 @@ def trained(giesekus_problem):
 @pytest.mark.slow
 def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
     law = recipes.make_network(jax.random.key(1), 3, True)
-    rebuild = Rebuild.everything(law)
-    weights = rebuild.start
-    _, jacobian = states_and_jacobian(weights, rebuild, giesekus_problem)
-    direction = jax.random.normal(jax.random.key(2), weights.shape)
-    predicted = eqx.filter_jit(lambda w, p: p.predicted(rebuild(w)))
-    step = 1e-5  # truncation of order step², rounding of order 1e-16/step
-    expected = (
-        predicted(weights + step * direction, giesekus_problem)
-        - predicted(weights - step * direction, giesekus_problem)
-    ) / (2 * step)
-    np.testing.assert_allclose(
-        jacobian @ direction, expected, atol=1e-7 * float(jnp.max(jnp.abs(expected)))
-    )
+    # truncation of order step², rounding of order 1e-16/step
+    told_as_differences(giesekus_problem, law, 1e-5, 1e-7)
 
 
 @pytest.mark.slow
@@ -250,17 +240,5 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
     # the training grid errs by 4e-6 of the stress in shear; extension stretches faster
     assert float(jnp.max(jnp.abs(problem.predicted(Giesekus(0.3)) - recorded))) < 1e-4
     law = recipes.make_network(jax.random.key(1), 3, True)
-    rebuild = Rebuild.everything(law)
-    along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
-    np.testing.assert_allclose(
-        along.recorded, problem.predicted(rebuild(rebuild.start)), atol=1e-10
-    )
-    direction = jax.random.normal(jax.random.key(2), rebuild.start.shape)
-    step = 1e-5
-    ahead, behind = (
-        problem.predicted(rebuild(rebuild.start + s * direction)) for s in (step, -step)
-    )
-    expected = (ahead - behind) / (2 * step)
-    np.testing.assert_allclose(
-        jacobian @ direction, expected, atol=1e-6 * float(jnp.max(jnp.abs(expected)))
-    )
+    along = told_as_differences(problem, law, 1e-5, 1e-6)
+    np.testing.assert_allclose(along.recorded, problem.predicted(law), atol=1e-10)
