@@ -31,7 +31,7 @@ from discover.learners.tbnn_ude.problem import (
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
-from tensor_library import TENSOR_NAMES, TermLibrary
+from tensor_library import TENSOR_NAMES, TermLibrary, parse_term
 
 RECIPES = ("default", "thorough", "paper")
 
@@ -287,27 +287,19 @@ def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[
 
 
 def _terms(projection: Projection, trained: Trained, cloud: Cloud) -> tuple[RecoveredTerm, ...]:
-    library = projection.library
-    if library is None:
+    if not projection.terms:
         return ()
+    chosen = TermLibrary(tuple(parse_term(term.term) for term in projection.terms))
     # the same terms in the law as the prior left it
-    shrunk = project(trained.penalised_law, cloud, library, max_terms=len(library))
-    penalised = (
-        {}
-        if shrunk.library is None
-        else dict(zip(shrunk.library.names, shrunk.coefficients, strict=True))
-    )
-    inner = {
-        form.inner_name: float(value)
-        for form, value in zip(library.forms, projection.inner, strict=True)
-    }
+    shrunk = project(trained.penalised_law, cloud, chosen, max_terms=len(chosen))
+    penalised = {term.term: term.coefficient for term in shrunk.terms}
     return tuple(
         RecoveredTerm(
-            term=term.name,
-            coefficient=float(coefficient),
-            coefficient_penalised=float(penalised.get(term.name, 0.0)),
-            inner={name: inner[name] for name in term.inner_names},
+            found.term,
+            found.coefficient,
+            found.inner,
+            coefficient_penalised=penalised.get(found.term, 0.0),
             latex=term.latex(),
         )
-        for term, coefficient in zip(library.terms, projection.coefficients, strict=True)
+        for found, term in zip(projection.terms, chosen.terms, strict=True)
     )
