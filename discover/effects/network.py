@@ -12,10 +12,11 @@ from discover.laws.textbook.classical import (
     Giesekus,
     JohnsonSegalman,
     LinearPhanThienTanner,
+    fene_p,
     fene_p_terms,
 )
 from discover.laws.textbook.scaled_relaxation import Saramito
-from tensor_library import LawTerm, identity_like, inner, trace
+from tensor_library import LawTerm, identity_like, inner
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):
@@ -68,11 +69,7 @@ class FiniteExtensibility(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        inverse = values[0]
-        stretch = trace(stress)
-        factor = 1.0 + inverse * stretch
-        growth = inverse * (inner(stress, rate) - factor * stretch) / (1.0 - 3.0 * inverse)
-        return inverse * stretch * stress - growth * (stress + identity_like(stress))
+        return fene_p(values[0], stress, rate)
 
     def as_terms(self, values):
         return fene_p_terms(values[0])

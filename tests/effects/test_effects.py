@@ -17,6 +17,7 @@ from discover.effects import (
     SeriesElement,
     SignalEffect,
     StateEffect,
+    known_effects,
     library_effects,
     make_effect,
     named_effects,
@@ -150,13 +151,6 @@ def test_the_shear_path_of_a_constitutive_effect_agrees_with_full_tensors(effect
     np.testing.assert_allclose(full, from_shear(shear), atol=1e-14)
 
 
-def test_finite_extensibility_on_maxwell_is_the_law_of_bird_dotson_and_johnson():
-    added = make_effect("finite_extensibility").extra_term(jnp.array([1 / 30]), STRESS, RATE)
-    # q = 1/L²
-    exact = LAWS["fene_p"].build(30.0).extra_term(STRESS, RATE)
-    np.testing.assert_allclose(added, exact, rtol=1e-12)
-
-
 def test_full_constraint_release_keeps_the_trace_of_the_conformation():
     # Rolie-Poly without stretch: tr A = 3 + tr(sigma) must not change in flow
     stress = jnp.array([0.9, -0.4, -0.5, 0.7])
@@ -288,3 +282,34 @@ def test_of_two_slips_that_shear_cannot_tell_apart_one_is_possible(xi):
     assert np.max(np.abs(one.N2 - other.N2)) > 0.1 * np.max(one.N1)
     slip = make_effect("non_affine_motion").parameters[0]
     assert (slip.low, slip.high) == (0.0, 1.0)
+
+
+def test_an_effect_has_the_values_that_were_written_and_the_rest_to_be_fitted():
+    (known,) = known_effects({"edge_fracture": {"critical_strain": 3.0, "loss": "fit"}})
+    # in the order of the dictionary of effects, whatever order they were written in
+    assert known.values == (None, 3.0)
+    assert known.free == ("loss",)
+    assert "to be fitted" in known.text
+
+
+def test_fit_alone_leaves_every_parameter_to_be_fitted():
+    (known,) = known_effects({"stress_gain": "fit"})
+    assert known.values == (None,)
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ({"stress_gian": "fit"}, "Unknown effect 'stress_gian'"),
+        ({"stress_gain": {"gain": 0.1}}, "no parameter 'gain'. Write gain_error"),
+        ({"edge_fracture": {"loss": 0.1}}, "needs critical_strain too"),
+        ({"stress_gain": {"gain_error": 7.0}}, "between -0.8 and 4"),
+        ({"stress_gain": {"gain_error": "free"}}, 'a number or "fit"'),
+        ({"stress_gain": 0.1}, 'must be "fit", or give its parameters: gain_error'),
+        (["stress_gain"], "must name effects with their values"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_sentence(written, words):
+    with pytest.raises(InputError, match="effects") as caught:
+        known_effects(written, "[model] effects")
+    assert words in str(caught.value)

@@ -112,17 +112,18 @@ class FenePeterlin(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        limit = self.maximum_extension_squared
-        trace_of_stress = trace(stress)
-        factor = 1.0 + trace_of_stress / limit
-        trace_of_conformation = (trace_of_stress + 3.0) / factor
-        factor_rate = (inner(stress, rate) - factor * trace_of_stress) / (
-            limit - trace_of_conformation
-        )
-        return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
+        return fene_p(1.0 / self.maximum_extension_squared, stress, rate)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
         return fene_p_terms(1.0 / float(self.maximum_extension_squared))
+
+
+def fene_p(inverse: Float[Array, ""], stress: Symmetric, rate: Symmetric) -> Symmetric:
+    """Return h of FENE-P with q = 1/L²: q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q)."""
+    stretch = trace(stress)
+    factor = 1.0 + inverse * stretch
+    growth = inverse * (inner(stress, rate) - factor * stretch) / (1.0 - 3.0 * inverse)
+    return inverse * stretch * stress - growth * (stress + identity_like(stress))
 
 
 def fene_p_terms(inverse: float) -> tuple[LawTerm, ...]:
