@@ -95,14 +95,3 @@ def parse_json(content: bytes) -> Any:
         return json.loads(content)
     except RecursionError:
         raise ValueError("nested too deeply") from None
-
-
-def xarray_module() -> Any:
-    """Return the module xarray."""
-    try:
-        import xarray
-    except ImportError:
-        raise InputError(
-            'This needs xarray; install it with: pip install "discover-rheology[xarray]".'
-        ) from None
-    return xarray

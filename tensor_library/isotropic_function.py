@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
-from tensor_library.notation import Notation, T
+from tensor_library.notation import Notation
 
 if TYPE_CHECKING:
     import sympy
@@ -69,8 +69,8 @@ class IsotropicFunction:
         return tuple(sorted(names - {*INVARIANT_NAMES, *self.where, *self.rates}))
 
     def spell(
-        self, notation: Notation[T], letters: Mapping[str, T]
-    ) -> tuple[list[tuple[str, T]], list[T]]:
+        self, notation: Notation, letters: Mapping[str, Any]
+    ) -> tuple[list[tuple[str, Any]], list[Any]]:
         """Return what is defined on the way, by name, and the summands of h, in a notation.
 
         `letters`: how constants, structure variables and defined scalars are written.
@@ -79,24 +79,15 @@ class IsotropicFunction:
         defined = [(name, notation.scalar(one, known)) for name, one in self.where.items()]
         summands = []
         for name, coefficient in self.coefficients.items():
-            parts = [
-                notation.contraction([*map(notation.tensor, part.split("."))])
-                for part in name.split("+")
-            ]
-            tensor = parts[0] if len(parts) == 1 else notation.sum(parts)
             one = notation.scalar(coefficient, known, factor=True)
-            summands.append(notation.product([one, tensor]))
+            summands.append(notation.product([one, notation.spelled(name)]))
         return defined, summands
 
-    def spell_rates(self, notation: Notation[T], letters: Mapping[str, T]) -> list[tuple[str, T]]:
+    def spell_rates(self, notation: Notation, letters: Mapping[str, Any]) -> list[tuple[str, Any]]:
         """Return the rate of change of each structure variable over 1/λ, as `spell` does."""
         known = _with_invariants(notation, letters)
         return [(name, notation.scalar(one, known)) for name, one in self.rates.items()]
 
 
-def _with_invariants(notation: Notation[T], letters: Mapping[str, T]) -> dict[str, T]:
-    known = {**letters}
-    for name in INVARIANT_NAMES:
-        inside = name.removeprefix("tr(").removesuffix(")").split(".")
-        known[name] = notation.trace(notation.contraction([*map(notation.tensor, inside)]))
-    return known
+def _with_invariants(notation: Notation, letters: Mapping[str, Any]) -> dict[str, Any]:
+    return {**letters, **{name: notation.spelled(name) for name in INVARIANT_NAMES}}

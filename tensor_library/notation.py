@@ -6,71 +6,15 @@ brackets. A notation only says how it writes a tensor, a product or a bracket.
 
 import re
 import unicodedata
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Generic, TypeVar
-
-T = TypeVar("T")
+from typing import Any
 
 
-class Notation(ABC, Generic[T]):
-    """How one format writes the parts of a term."""
+class Notation:
+    """How one format writes the parts of a term: text by patterns, ``{}`` for what is written.
 
-    @abstractmethod
-    def tensor(self, name: str) -> T:
-        """Return the tensor ``I``, ``sigma`` or ``gammadot``."""
-
-    @abstractmethod
-    def contraction(self, tensors: Sequence[T]) -> T:
-        """Return the tensors contracted in this order, a·b·c."""
-
-    @abstractmethod
-    def sum(self, summands: Sequence[T]) -> T:
-        """Return a sum that may stand as a factor: in text, with its brackets."""
-
-    @abstractmethod
-    def trace(self, tensor: T) -> T:
-        """Return the trace of a contraction."""
-
-    @abstractmethod
-    def power(self, scalar: T, exponent: int) -> T:
-        """Return a trace raised to a power of 2 or more."""
-
-    @abstractmethod
-    def number(self, value: float) -> T:
-        """Return a number that may stand as a factor: in text, bracketed if it is negative."""
-
-    @abstractmethod
-    def letter(self, name: str) -> T:
-        """Return the letter of an inner parameter."""
-
-    @abstractmethod
-    def exponential(self, rate: T, trace: T) -> T:
-        """Return exp(rate · trace) − 1, as a factor."""
-
-    @abstractmethod
-    def saturating(self, level: T, trace: T) -> T:
-        """Return trace/(1 + level |trace|), as a factor."""
-
-    @abstractmethod
-    def scalar(self, expression: Any, letters: Mapping[str, T], factor: bool = False) -> T:
-        """Return a SymPy expression with `letters` for its symbols; bracketed to be a factor."""
-
-    def function(self, expression: Callable[[Any, Any], Any], trace: T, parameter: T) -> T:
-        """Return a closed form of a user's own, given as a SymPy expression, as a factor."""
-        import sympy
-
-        symbols = sympy.symbols("trace parameter", real=True)
-        found = sympy.sympify(expression(*symbols))
-        return self.scalar(found, {"trace": trace, "parameter": parameter}, factor=True)
-
-    @abstractmethod
-    def product(self, factors: Sequence[T]) -> T:
-        """Return scalars times one tensor, in this order."""
-
-
-class TextNotation(Notation[str]):
-    """Text by patterns, in which ``{}`` stands for what is written."""
+    A notation of another kind, such as expressions, answers each question by itself.
+    """
 
     tensors: Mapping[str, str]
     dot: str  # between tensors
@@ -83,43 +27,67 @@ class TextNotation(Notation[str]):
     exponential_form: str  # of ``rate`` and ``trace``
     saturating_form: str  # of ``level`` and ``trace``
 
-    def tensor(self, name: str) -> str:
-        """Return its letter."""
+    def tensor(self, name: str) -> Any:
+        """Return the tensor ``I``, ``sigma`` or ``gammadot``."""
         return self.tensors[name]
 
-    def contraction(self, tensors: Sequence[str]) -> str:
-        """Return the tensors with dots between them."""
+    def spelled(self, name: str) -> Any:
+        """Return a tensor or an invariant by its canonical spelling, as a factor."""
+        if name.startswith("tr("):
+            return self.trace(self.spelled(name[len("tr(") : -1]))
+        each = [one.split(".") for one in name.split("+")]
+        summands = [self.contraction([self.tensor(part) for part in parts]) for parts in each]
+        return summands[0] if len(summands) == 1 else self.sum(summands)
+
+    def contraction(self, tensors: Sequence[Any]) -> Any:
+        """Return the tensors contracted in this order, a·b·c."""
         return self.dot.join(tensors)
 
-    def sum(self, summands: Sequence[str]) -> str:
-        """Return the bracketed sum."""
+    def sum(self, summands: Sequence[Any]) -> Any:
+        """Return a sum that may stand as a factor: in text, with its brackets."""
         return self.brackets.format(self.plus.join(summands))
 
-    def trace(self, tensor: str) -> str:
+    def trace(self, tensor: Any) -> Any:
         """Return the trace of a contraction."""
         return self.traced.format(tensor)
 
-    def power(self, scalar: str, exponent: int) -> str:
+    def power(self, scalar: Any, exponent: int) -> Any:
         """Return a trace raised to a power of 2 or more."""
         return self.powered.format(scalar, exponent)
 
-    def number(self, value: float) -> str:
-        """Return a number, bracketed if it is negative."""
+    def number(self, value: float) -> Any:
+        """Return a number that may stand as a factor: in text, bracketed if it is negative."""
         return self.brackets.format(self.digits_of(value)) if value < 0 else self.digits_of(value)
 
     def digits_of(self, value: float) -> str:
         """Return a number with the digits that it is given."""
         raise NotImplementedError
 
-    def exponential(self, rate: str, trace: str) -> str:
+    def letter(self, name: str) -> Any:
+        """Return the letter of an inner parameter."""
+        raise NotImplementedError
+
+    def exponential(self, rate: Any, trace: Any) -> Any:
         """Return exp(rate · trace) − 1, as a factor."""
         return self.exponential_form.format(rate=rate, trace=trace)
 
-    def saturating(self, level: str, trace: str) -> str:
+    def saturating(self, level: Any, trace: Any) -> Any:
         """Return trace/(1 + level |trace|), as a factor."""
         return self.saturating_form.format(level=level, trace=trace)
 
-    def product(self, factors: Sequence[str]) -> str:
+    def scalar(self, expression: Any, letters: Mapping[str, Any], factor: bool = False) -> Any:
+        """Return a SymPy expression with `letters` for its symbols; bracketed to be a factor."""
+        raise NotImplementedError
+
+    def function(self, expression: Callable[[Any, Any], Any], trace: Any, parameter: Any) -> Any:
+        """Return a closed form of a user's own, given as a SymPy expression, as a factor."""
+        import sympy
+
+        symbols = sympy.symbols("trace parameter", real=True)
+        found = sympy.sympify(expression(*symbols))
+        return self.scalar(found, {"trace": trace, "parameter": parameter}, factor=True)
+
+    def product(self, factors: Sequence[Any]) -> Any:
         """Return scalars times one tensor, in this order."""
         return self.whole.format(self.times.join(factors))
 
@@ -162,7 +130,7 @@ def latex_number(value: float, digits: int) -> str:
     return mantissa + (rf" \times 10^{{{int(exponent)}}}" if exponent else "")
 
 
-class LatexNotation(TextNotation):
+class LatexNotation(Notation):
     """LaTeX with so many significant digits in its numbers."""
 
     tensors = {  # noqa: RUF012

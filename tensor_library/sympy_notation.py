@@ -27,51 +27,40 @@ class Trace(sympy.Function):
         return printer._print_Function(self, func_name="tr")
 
 
-class SympyNotation(Notation[sympy.Expr]):
+class SympyNotation(Notation):
     """Expressions; brackets are the expression tree's own."""
 
     def tensor(self, name: str) -> sympy.Expr:
-        """Return a non-commuting symbol."""
         return {"I": UNIT, "sigma": STRESS, "gammadot": RATE}[name]
 
     def contraction(self, tensors: Sequence[sympy.Expr]) -> sympy.Expr:
-        """Return the product in this order."""
         return sympy.Mul(*tensors)
 
     def sum(self, summands: Sequence[sympy.Expr]) -> sympy.Expr:
-        """Return the sum."""
         return sympy.Add(*summands)
 
     def trace(self, tensor: sympy.Expr) -> sympy.Expr:
-        """Return the trace, which commutes."""
         return Trace(tensor)  # pyright: ignore[reportReturnType]
 
     def power(self, scalar: sympy.Expr, exponent: int) -> sympy.Expr:
-        """Return the power."""
         return sympy.Pow(scalar, exponent)
 
     def number(self, value: float) -> sympy.Expr:
-        """Return a float."""
         return sympy.Float(value)
 
     def letter(self, name: str) -> sympy.Expr:
-        """Return a symbol."""
         return sympy.Symbol(name)
 
     def exponential(self, rate: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
-        """Return exp(rate · trace) − 1."""
         return sympy.exp(rate * trace) - 1  # pyright: ignore[reportReturnType]
 
     def saturating(self, level: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
-        """Return trace/(1 + level |trace|)."""
         return trace / (1 + level * sympy.Abs(trace))
 
     def scalar(
         self, expression: Any, letters: Mapping[str, sympy.Expr], factor: bool = False
     ) -> sympy.Expr:
-        """Return the expression."""
         return expression.xreplace({one: letters[one.name] for one in expression.free_symbols})
 
     def product(self, factors: Sequence[sympy.Expr]) -> sympy.Expr:
-        """Return the product."""
         return sympy.Mul(*factors)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -18,7 +18,7 @@ from tensor_library.algebra import (
     scalar_invariants,
 )
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
-from tensor_library.notation import LatexNotation, Notation, T
+from tensor_library.notation import LatexNotation, Notation
 
 if TYPE_CHECKING:
     import sympy
@@ -127,10 +127,10 @@ class CandidateTerm:
 
     def spell(
         self,
-        notation: Notation[T],
+        notation: Notation,
         coefficient: float | None = None,
         inner: Mapping[str, float] | None = None,
-    ) -> T:
+    ) -> Any:
         """Return the term in a notation, as a factor: a sum of tensors is bracketed.
 
         Parameters
@@ -145,7 +145,7 @@ class CandidateTerm:
             name = self.form.inner_name
             known = name in (inner or {})
             parameter = notation.number((inner or {})[name]) if known else notation.letter(name)
-            trace = notation.trace(notation.tensor("sigma"))
+            trace = notation.spelled("tr(sigma)")
             if self.form.expression is not None:
                 factors.append(notation.function(self.form.expression, trace, parameter))
             else:
@@ -153,11 +153,9 @@ class CandidateTerm:
                 factors.append(built_in[self.form.name](parameter, trace))
         for name, power in zip(INVARIANT_NAMES, self.powers, strict=True):
             if power:
-                trace = notation.trace(_contraction(name[len("tr(") : -1], notation))
+                trace = notation.spelled(name)
                 factors.append(trace if power == 1 else notation.power(trace, power))
-        summands = [_contraction(name, notation) for name in TENSOR_NAMES[self.tensor].split("+")]
-        factors.append(summands[0] if len(summands) == 1 else notation.sum(summands))
-        return notation.product(factors)
+        return notation.product([*factors, notation.spelled(TENSOR_NAMES[self.tensor])])
 
     def sympy(self) -> "sympy.Expr":
         """Return the term as a SymPy expression with non-commuting tensors."""
@@ -199,7 +197,3 @@ def parse_term(name: str) -> CandidateTerm:
             "'tr(sigma)*sigma'."
         )
     return CandidateTerm(TENSOR_NAMES.index(tensor), tuple(powers), closed_form)
-
-
-def _contraction(name: str, notation: Notation[T]) -> T:
-    return notation.contraction([notation.tensor(one) for one in name.split(".")])

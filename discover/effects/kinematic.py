@@ -70,7 +70,6 @@ class RateGain(KinematicEffect):
     acts_on_steady_states = takes_numpy = True
 
     def felt_rate(self, values, instrument_times, shear_rate):
-        """Return (1 + g_r) γ̇."""
         del instrument_times
         return (1.0 + values[0]) * shear_rate
 
@@ -136,7 +135,6 @@ class RateRiseTime(KinematicEffect):
     takes_numpy = True
 
     def felt_rate(self, values, instrument_times, shear_rate):
-        """Return the lagged rate: t_m γ̇_felt' + γ̇_felt = γ̇, from rest."""
         return first_order_lag(instrument_times, shear_rate, values[0])
 
 
@@ -161,7 +159,6 @@ class ToolCompliance(SeriesElement):
     """The strain felt is the commanded one less C σ   [Gottlieb & Macosko 1982]."""
 
     def slip_and_compliance(self, values):
-        """Return 0 and C."""
         return jnp.zeros_like(values[0]), values[0]
 
 
@@ -187,7 +184,6 @@ class WallSlip(SeriesElement):
     acts_on_steady_states = True
 
     def slip_and_compliance(self, values):
-        """Return s_w and 0."""
         return values[0], jnp.zeros_like(values[0])
 
 

@@ -22,7 +22,6 @@ class LibraryTerm(ConstitutiveEffect):
         return values[0] * self.term.evaluate(stress, rate, self._inner(values))
 
     def as_terms(self, values):
-        """Return c · term."""
         return (LawTerm(self.name, values[0], self._inner(values)),)
 
     def _inner(self, values):

@@ -16,18 +16,15 @@ class Thixotropy(StateEffect):
     acts_on_steady_states = True
 
     def source_and_decay(self, values, shear_rate, stress):
-        """Return 1/t_b and 1/t_b + k |γ̇|."""
         del stress
         build_up = 1.0 / values[1]
         return build_up, build_up + values[0] * jnp.abs(shear_rate)
 
     def written(self):
-        """Return the equation of s, and s."""
         s, breakdown, time, rate = scalars(self.name, "breakdown", "build_up_time", "shear_rate")
         return WrittenState(((1 - s) / time - breakdown * rate * s,), modulus_factor=s)
 
     def modulus_factor(self, values, state):
-        """Return s."""
         del values
         return state
 
@@ -67,11 +64,9 @@ class ViscousHeating(StateEffect):
     """
 
     def source_and_decay(self, values, shear_rate, stress):
-        """Return b_h σγ̇ and 1/t_h."""
         return values[0] * stress * shear_rate, 1.0 / values[1]
 
     def written(self):
-        """Return the equation of Θ, and exp(−Θ)."""
         import sympy
 
         softening, time = scalars(*(parameter.name for parameter in self.parameters))
@@ -80,7 +75,6 @@ class ViscousHeating(StateEffect):
         return WrittenState((changes,), time_factor=sympy.exp(-theta))
 
     def time_factor(self, values, state):
-        """Return exp(−Θ)."""
         del values
         return jnp.exp(-state)
 

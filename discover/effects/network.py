@@ -1,10 +1,22 @@
 """Effects of the fluid: terms of the law of every mode, added modes and stresses."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
 import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter, ModeEffect
-from discover.laws.textbook.classical import fene_p_terms
-from tensor_library import LawTerm, anticommutator, identity_like, inner, square, trace
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.textbook.classical import (
+    ExponentialPhanThienTanner,
+    Giesekus,
+    JohnsonSegalman,
+    LinearPhanThienTanner,
+    fene_p,
+    fene_p_terms,
+)
+from discover.laws.textbook.scaled_relaxation import Saramito
+from tensor_library import LawTerm, identity_like, inner
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):
@@ -15,12 +27,10 @@ class ConvectiveConstraintRelease(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        """Return c tr(σ·γ̇)[(1 + β)σ + I]."""
         release = (1.0 + values[1]) * stress + identity_like(stress)
         return values[0] * inner(stress, rate) * release
 
     def as_terms(self, values):
-        """Return both parts."""
         c, beta = values
         return (
             LawTerm("tr(sigma.gammadot)*sigma", c * (1.0 + beta)),
@@ -59,15 +69,9 @@ class FiniteExtensibility(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        """Return q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q)."""
-        inverse = values[0]
-        stretch = trace(stress)
-        factor = 1.0 + inverse * stretch
-        growth = inverse * (inner(stress, rate) - factor * stretch) / (1.0 - 3.0 * inverse)
-        return inverse * stretch * stress - growth * (stress + identity_like(stress))
+        return fene_p(values[0], stress, rate)
 
     def as_terms(self, values):
-        """Return the six terms of FENE-P."""
         return fene_p_terms(values[0])
 
 
@@ -89,21 +93,22 @@ FINITE_EXTENSIBILITY = FiniteExtensibility(
 )  # fmt: skip
 
 
-class GiesekusMobility(ConstitutiveEffect):
-    """Adds α σ·σ   [Giesekus 1982, JNNFM 11, 69]."""
+@dataclass(frozen=True)
+class AddedLaw(ConstitutiveEffect):
+    """Adds the h of a law, with the effect's parameters for its constants."""
+
+    law: Callable[..., AbstractConstitutiveLaw] = field(kw_only=True)
 
     def extra_term(self, values, stress, rate):
-        """Return α σ·σ."""
-        del rate
-        return values[0] * square(stress)
+        return self.law(*values).extra_term(stress, rate)
 
     def as_terms(self, values):
-        """Return α σ·σ."""
-        return (LawTerm("sigma.sigma", values[0]),)
+        """Return h of the law as a sum of library terms; None of a law that is none."""
+        return self.law(*values).as_terms()
 
 
-GIESEKUS_MOBILITY = GiesekusMobility(
-    name="giesekus_mobility",
+GIESEKUS_MOBILITY = AddedLaw(
+    name="giesekus_mobility", law=Giesekus,
     parameters=(
         EffectParameter(
             "alpha", r"\alpha", meaning="mobility", low=0.0, high=1.0, first_trial=0.01,
@@ -117,20 +122,8 @@ GIESEKUS_MOBILITY = GiesekusMobility(
 )  # fmt: skip
 
 
-class NonAffineMotion(ConstitutiveEffect):
-    """Adds (ξ/2)(σ·γ̇ + γ̇·σ)   [Johnson & Segalman 1977, JNNFM 2, 255]."""
-
-    def extra_term(self, values, stress, rate):
-        """Return (ξ/2)(σ·γ̇ + γ̇·σ)."""
-        return 0.5 * values[0] * anticommutator(stress, rate)
-
-    def as_terms(self, values):
-        """Return (ξ/2)(σ·γ̇ + γ̇·σ)."""
-        return (LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * values[0]),)
-
-
-NON_AFFINE_MOTION = NonAffineMotion(
-    name="non_affine_motion", explicit_rate=True,
+NON_AFFINE_MOTION = AddedLaw(
+    name="non_affine_motion", law=JohnsonSegalman, explicit_rate=True,
     parameters=(
         EffectParameter(
             "xi", r"\xi", meaning="slip of the network", low=0.0, high=1.0, first_trial=0.01,
@@ -154,22 +147,8 @@ _ELONGATION = EffectParameter(
 )  # fmt: skip
 
 
-class ExponentialNetworkLoss(ConstitutiveEffect):
-    """Adds (exp(ε tr σ) − 1) σ   [Phan-Thien 1978, J. Rheol. 22, 259]."""
-
-    def extra_term(self, values, stress, rate):
-        """Return (exp(ε tr σ) − 1) σ."""
-        del rate
-        # beyond exp(60) a trial is absurd; the cap keeps it finite, to be rejected for its misfit
-        return jnp.expm1(jnp.minimum(values[0] * trace(stress), 60.0)) * stress
-
-    def as_terms(self, values):
-        """Return (exp(ε tr σ) − 1) σ."""
-        return (LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": values[0]}),)
-
-
-PTT_EXPONENTIAL = ExponentialNetworkLoss(
-    name="ptt_exponential", complexity=2,
+PTT_EXPONENTIAL = AddedLaw(
+    name="ptt_exponential", law=ExponentialPhanThienTanner, complexity=2,
     parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
     source="Phan-Thien 1978, J. Rheol. 22, 259",
@@ -178,21 +157,8 @@ PTT_EXPONENTIAL = ExponentialNetworkLoss(
 )  # fmt: skip
 
 
-class LinearNetworkLoss(ConstitutiveEffect):
-    """Adds ε tr(σ) σ   [Phan-Thien & Tanner 1977, JNNFM 2, 353]."""
-
-    def extra_term(self, values, stress, rate):
-        """Return ε tr(σ) σ."""
-        del rate
-        return values[0] * trace(stress) * stress
-
-    def as_terms(self, values):
-        """Return ε tr(σ) σ."""
-        return (LawTerm("tr(sigma)*sigma", values[0]),)
-
-
-PTT_LINEAR = LinearNetworkLoss(
-    name="ptt_linear",
+PTT_LINEAR = AddedLaw(
+    name="ptt_linear", law=LinearPhanThienTanner,
     parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
     source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
@@ -215,7 +181,6 @@ class StrainDamping(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        """Return n λ|γ̇| (σ + I)."""
         size = jnp.sqrt(jnp.maximum(0.5 * inner(rate, rate), _AT_REST))
         return values[0] * size * (stress + identity_like(stress))
 
@@ -237,25 +202,9 @@ STRAIN_DAMPING = StrainDamping(
 )  # fmt: skip
 
 
-_TINY = 1e-12
-
-
-class YieldStress(ConstitutiveEffect):
-    """Lets only the stress beyond yield relax [Saramito 2007, JNNFM 145, 1].
-
-    Relaxation carries the factor max(0, 1 − Y/|σ_d|), with |σ_d| = √(σ_d:σ_d/2) of the deviator.
-    """
-
-    def extra_term(self, values, stress, rate):
-        """Return −min(1, Y/|σ_d|) σ."""
-        del rate
-        squared = 0.5 * (inner(stress, stress) - trace(stress) ** 2 / 3.0)
-        size = jnp.sqrt(jnp.maximum(squared, _TINY**2))
-        return -jnp.minimum(1.0, values[0] / size) * stress
-
-
-YIELD_STRESS = YieldStress(
-    name="yield_stress", complexity=2,
+# only the stress beyond yield relaxes, with the factor max(0, 1 − Y/|σ_d|)
+YIELD_STRESS = AddedLaw(
+    name="yield_stress", law=Saramito, complexity=2,
     parameters=(
         EffectParameter(
             "yield_strain", "Y", low=0.0, high=10.0, first_trial=0.01,
@@ -275,7 +224,6 @@ class RelaxationMode(ModeEffect):
     """One more mode under the declared law   [generalised Maxwell model, Ferry 1980, ch. 1]."""
 
     def mode(self, values):
-        """Return G and λ."""
         return values[0], values[1]
 
 
@@ -308,7 +256,6 @@ class SolventViscosity(ConstitutiveEffect):
     """Adds η_s γ̇ to the stress   [Oldroyd 1950, Proc. R. Soc. A 200, 523]."""
 
     def instantaneous_stress(self, values, shear_rate):
-        """Return η_s γ̇ in Pa."""
         return values[0] * shear_rate
 
 

@@ -8,12 +8,14 @@ from discover.effects.kinematic import first_order_lag
 
 
 class BearingFriction(SignalEffect):
-    """A torque against the motion, of constant size, is recorded with the stress (Coulomb)."""
+    """A torque against the motion, of constant size, is recorded with the stress (Coulomb).
+
+    It follows the rate of the tool, whatever the fluid feels of that.
+    """
 
     acts_on_steady_states = takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return σ + σ_f sign(γ̇), with the rate of the tool, whatever the fluid feels of it."""
         sign = record.tool_rate.__array_namespace__().sign
         return record.stress + values[0] * sign(record.tool_rate)
 
@@ -47,7 +49,6 @@ class EdgeFracture(SignalEffect):
     takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return σ exp(−k_e max(0, γ_total − γ_c))."""
         of = record.stress.__array_namespace__()
         beyond = of.maximum(record.total_strain - values[1], 0.0)
         return record.stress * of.exp(-values[0] * beyond)
@@ -85,12 +86,14 @@ _JUMP = 1e-9
 
 
 class InstrumentInertia(SignalEffect):
-    """The stress recorded contains the inertia of the tool; negative if over-corrected."""
+    """The stress recorded contains the inertia of the tool; negative if over-corrected.
+
+    It follows the rate of the tool, whatever the fluid feels of that.
+    """
 
     takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return σ + I dγ̇/dt, with the rate of the tool, whatever the fluid feels of it."""
         of, times = record.tool_rate.__array_namespace__(), record.instrument_times
         step = of.diff(times)
         shortest = _JUMP * (times[..., -1:] - times[..., :1])
@@ -102,7 +105,6 @@ class InstrumentInertia(SignalEffect):
         return record.stress + values[0] * record.clock_factor * at_points
 
     def inertia(self, values):
-        """Return I_t."""
         return values[0]
 
 
@@ -131,7 +133,6 @@ class StressDrift(SignalEffect):
     takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return σ + a t."""
         return record.stress + values[0] * record.instrument_times
 
 
@@ -158,7 +159,6 @@ class StressGain(SignalEffect):
     acts_on_steady_states = takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return (1 + g_s) σ."""
         return (1.0 + values[0]) * record.stress
 
 
@@ -207,7 +207,6 @@ class StressOffset(SignalEffect):
     acts_on_steady_states = takes_numpy = is_zero = True
 
     def recorded_stress(self, values, record):
-        """Return σ + σ₀."""
         return record.stress + values[0]
 
 
@@ -229,12 +228,14 @@ STRESS_OFFSET = StressOffset(
 
 
 class TimeDelay(SignalEffect):
-    """The stress recorded is the true one some time earlier, on the instrument's clock."""
+    """The stress recorded is the true one some time earlier, on the instrument's clock.
+
+    It is zero before the flow starts.
+    """
 
     takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return σ(t − δ), which is zero before the flow starts."""
         earlier = record.instrument_times - values[0]
         if not isinstance(record.stress, np.ndarray):
             return jnp.interp(earlier, record.instrument_times, record.stress, left=0.0)
@@ -243,7 +244,6 @@ class TimeDelay(SignalEffect):
         return np.stack([np.interp(*row, left=0.0) for row in rows]).reshape(earlier.shape)
 
     def response(self, values, frequency):
-        """Return exp(−iωδ)."""
         return jnp.exp(-1j * frequency * values[0])
 
 
@@ -270,11 +270,9 @@ class TransducerLag(SignalEffect):
     takes_numpy = True
 
     def recorded_stress(self, values, record):
-        """Return the lagged stress: t_f σ_rec' + σ_rec = σ, from rest."""
         return first_order_lag(record.instrument_times, record.stress, values[0])
 
     def response(self, values, frequency):
-        """Return 1/(1 + iω t_f)."""
         return 1.0 / (1.0 + 1j * frequency * values[0])
 
 

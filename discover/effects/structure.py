@@ -41,7 +41,6 @@ class Structure(StateEffect):
         return self.scales == "time"
 
     def source_and_decay(self, values, shear_rate, stress):
-        """Return 1/t_b and (1 + (X/X_c)^m)/t_b, of both structures where there are two."""
         times = values[1] if self.levels == 1 else values[1] * jnp.array([1.0, values[2]])
         size = values[0] * jnp.abs(shear_rate if self.broken_by == "rate" else stress)
         # a power below one has no derivative at zero
@@ -51,7 +50,6 @@ class Structure(StateEffect):
         return 1.0 / times, (1.0 + broken) / times
 
     def written(self):
-        """Return the equation of each structure, and the factor that is s."""
         import sympy
 
         critical, exponent, time, slowness, share, breaks = scalars(
@@ -73,11 +71,9 @@ class Structure(StateEffect):
         return (1.0 - values[3]) * state[0] + values[3] * state[1]
 
     def modulus_factor(self, values, state):
-        """Return s where it multiplies the stress."""
         return jnp.ones(()) if self.changes_times else self.whole(values, state)
 
     def time_factor(self, values, state):
-        """Return s where it multiplies the relaxation times."""
         return self.whole(values, state) if self.changes_times else jnp.ones(())
 
 

@@ -40,6 +40,10 @@ class Box:
         """Box in words."""
         return f"Wi {_span(self.weissenberg)}, De {_span(self.deborah)}"
 
+    def to_json(self) -> dict[str, list[float]]:
+        """Return the ranges by their letters."""
+        return {"Wi": [*map(float, self.weissenberg)], "De": [*map(float, self.deborah)]}
+
 
 @dataclass(frozen=True)
 class Tested:
@@ -48,6 +52,12 @@ class Tested:
     learned_in: Box  # flows that the fit saw
     judged_in: Box | None = None  # others in which something is known
     worst_errors: Mapping[str, float] = field(default_factory=dict)  # the largest there, relative
+
+    @property
+    def boxes(self) -> dict[str, dict[str, list[float]] | None]:
+        """Where it was learned and where judged, as JSON."""
+        judged = None if self.judged_in is None else self.judged_in.to_json()
+        return {"learned_in": self.learned_in.to_json(), "judged_in": judged}
 
     @property
     def lines(self) -> list[str]:

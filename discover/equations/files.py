@@ -181,12 +181,7 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
             for g, time in zip(equation.modulus, equation.relaxation_time, strict=True)
         ],
         "solvent_viscosity_Pa_s": equation.solvent_viscosity,
-        "tested": tested
-        and {
-            "learned_in": _box(tested.learned_in),
-            "judged_in": tested.judged_in and _box(tested.judged_in),
-            "worst_errors": dict(tested.worst_errors),
-        },
+        "tested": tested and tested.boxes | {"worst_errors": dict(tested.worst_errors)},
     }
 
 
@@ -213,10 +208,6 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
         )  # fmt: skip
     except ValueError as error:
         raise InputError(f"{where}: {error} {again}") from None
-
-
-def _box(box: Box) -> dict[str, list[float]]:
-    return {"Wi": list(box.weissenberg), "De": list(box.deborah)}
 
 
 FORMATS: Mapping[str, Callable[[Equation], str]] = {

@@ -175,8 +175,7 @@ class AugmentedFluid:
         for name, at in self._varying_law.items():
             known[name] = self._varied(theta, known[name], named.parameters[name], at, places)
         columns = [jnp.broadcast_to(value, places.shape) for value in known.values()]
-        built = jax.vmap(named.build)(*columns)
-        return LawOfEachMode(law=built, linear_relaxation=built.linear_relaxation)
+        return LawOfEachMode(law=jax.vmap(named.build)(*columns))
 
     def of_modes(self, numbers, theta) -> OfModes:
         """Return what a vector of parameters says of each mode."""

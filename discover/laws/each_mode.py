@@ -10,14 +10,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw, State
+from discover.laws.base import AbstractConstitutiveLaw, AbstractExtendedLaw, State
 from tensor_library.algebra import Symmetric, VelocityGradient
-from tensor_library.law_terms import LawTerm
 
 Tree = TypeVar("Tree")
 
 
-class LawOfEachMode(AbstractConstitutiveLaw):
+class LawOfEachMode(AbstractExtendedLaw):
     """One law for each mode of a fluid: the same equation with constants of its own.
 
     It stands for a law where a fluid takes one, alone or below added terms. What follows the modes
@@ -25,46 +24,24 @@ class LawOfEachMode(AbstractConstitutiveLaw):
     """
 
     law: AbstractConstitutiveLaw  # the law, with a leading axis of modes on every array
-    linear_relaxation: bool = eqx.field(static=True, default=True)  # as in the law
 
     @property
-    def variables(self) -> int:
-        """As in the law."""
-        return self.law.variables
+    def base(self) -> AbstractConstitutiveLaw:
+        """The law, of which all is as of it."""
+        return self.law
 
     @property
-    def tensors(self) -> int:
+    def linear_relaxation(self) -> bool:
         """As in the law."""
-        return self.law.tensors
-
-    @property
-    def retracts(self) -> bool:
-        """As in the law."""
-        return self.law.retracts
+        return self.law.linear_relaxation
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h of the law, of one mode."""
         return self.law.extra_term(stress, rate)
 
-    def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return None: no sum of terms is the law of all modes."""
-        return None
-
     def trace_relaxation(self, stress: State) -> Float[Array, ""]:
         """Return that of the law, of one mode."""
         return self.law.trace_relaxation(stress)
-
-    def relaxations(self) -> Float[Array, "t 2"]:
-        """Return those of the law, of one mode."""
-        return self.law.relaxations()
-
-    def shares(self) -> Float[Array, " tensors"]:
-        """Return those of the law, of one mode."""
-        return self.law.shares()
-
-    def conformation(self, stress: Symmetric) -> Symmetric:
-        """Return that of the law, of one mode."""
-        return self.law.conformation(stress)
 
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
         """Return that of the law, of one mode."""
@@ -85,9 +62,8 @@ def law_of_each_mode(laws: Sequence[AbstractConstitutiveLaw]) -> LawOfEachMode:
             f"The law {type(laws[0]).__name__} carries several tensors in every mode, and its "
             "constants must be the same in all of them."
         )
-    relaxes = laws[0].linear_relaxation
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(arrays for arrays, _ in parts))
-    return LawOfEachMode(law=eqx.combine(stacked, parts[0][1]), linear_relaxation=relaxes)
+    return LawOfEachMode(law=eqx.combine(stacked, parts[0][1]))
 
 
 def differs_by_mode(law: AbstractConstitutiveLaw) -> bool:
@@ -153,8 +129,7 @@ def with_modes(
             found = jax.vmap(lambda row: jnp.interp(asked, known, row), 1, 1)(rows)
             return found.reshape(len(asked), *leaf.shape[1:])
 
-        moved = jax.tree.map(between, part.law)
-        return LawOfEachMode(law=moved, linear_relaxation=part.linear_relaxation)
+        return LawOfEachMode(law=jax.tree.map(between, part.law))
 
     return jax.tree.map(of_times, law, is_leaf=_is_of_each)
 

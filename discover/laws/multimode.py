@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.each_mode import over_modes, require_modes
+from discover.laws.each_mode import require_modes
 from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
@@ -82,13 +82,10 @@ class Fluid(eqx.Module):
                 f"got {self.law!r}."
             )
         shape = self.relaxation_time.shape
-        covariance = self.modulus_covariance
-        amounts = {(k, k) for k in (*shape, *(n + 1 for n in shape))}  # a solvent's is the last
-        if self.solvent_viscosity.ndim or not (covariance is None or covariance.shape in amounts):
+        if self.solvent_viscosity.ndim:
             raise InputError(
-                "A fluid needs one solvent viscosity, and a covariance of its moduli with a row "
-                f"and a column for each; got the shapes {self.solvent_viscosity.shape} and "
-                f"{None if covariance is None else covariance.shape}."
+                "A fluid needs one solvent viscosity; got the shape "
+                f"{self.solvent_viscosity.shape}."
             )
         if self.modulus.shape != shape or len(shape) != 1 or not shape[0]:
             raise InputError(
@@ -107,6 +104,22 @@ class Fluid(eqx.Module):
             if not np.all((numbers >= least) & np.isfinite(numbers)):
                 wanted = "positive and finite" if least else "finite and not negative"
                 raise InputError(f"{label} of a fluid must be {wanted}; got {numbers.tolist()}.")
+        self._check_covariance()
+
+    def _check_covariance(self) -> None:
+        covariance, modes = self.modulus_covariance, self.n_modes
+        if covariance is None:
+            return
+        usable = covariance.shape in ((modes,) * 2, (modes + 1,) * 2)
+        if usable and not isinstance(covariance, Tracer):
+            values = np.asarray(covariance)
+            usable = np.all(np.isfinite(values)) and np.allclose(values, values.T)
+        if not usable:
+            raise InputError(
+                "modulus_covariance must be a symmetric matrix in Pa² with one row for each mode, "
+                f"and one for a solvent or none; got the shape {covariance.shape} for {modes} "
+                "modes."
+            )
 
     def __repr__(self) -> str:
         modes = counted(self.n_modes, "mode")
@@ -198,18 +211,6 @@ class Fluid(eqx.Module):
     def rest(self) -> Float[Array, "k s"]:
         """Return the state at rest."""
         return jnp.tile(self.law.rest(), (self.n_modes, 1))
-
-    def state_rate(
-        self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
-    ) -> Float[Array, "k s"]:
-        """Return d(state)/dt in 1/s.
-
-        `state`: σ_k/G_k, dimensionless, four components with the variables behind, (k, s).
-        `velocity_gradient`: γ̇, (), or four components of L, (4,), in 1/s.
-        """
-        scaled = jnp.multiply.outer(self.relaxation_time, velocity_gradient)
-        of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), self.law)
-        return of_modes(state, scaled) / self.relaxation_time[:, None]
 
     def stress(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient

@@ -1,36 +1,45 @@
-"""Estimators in files: plain text and arrays, with what made them."""
+"""Estimators in files: gzipped JSON, with what made them, and back, without pickle."""
 
+import dataclasses
+import gzip
 import hashlib
-import io
 import json
-import math
 import os
-import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from discover._version import __version__
 from discover.dataset.run import Run
 from discover.dataset.tables.table import read_bytes
+from discover.equations import law_parts
 from discover.errors import InputError
-from discover.learners.plain_values import PlainReader, PlainWriter
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import LawOfEachMode, law_of_each_mode
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
+from discover.laws.registry import LAWS, make_law, name_of
+from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.plain_numbers import parse_json
+from tensor_library import TermLibrary, parse_term
 
-FORMAT, VERSION = "discover estimator", 2
-_HEADER = "estimator.json"
+FORMAT, VERSION = "discover estimator", 3
 _LARGEST = 2**28
-"""Bytes that all parts of a file unpack to, at most: an estimator of megabytes is a large one."""
+"""Bytes of a file, and of what it unpacks to, at most: an estimator of megabytes is a large one."""
 
-_MOST_MEMBERS = 10_000
+_DAMAGES = (LookupError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
 
-_HEAD = 512
-"""Bytes of an array's head, which NumPy reads as a Python literal; of plain numbers it has 118."""
+_KIND = "kind"
+
+Types = Sequence[type]
+"""Dataclasses that a file may hold beside numbers, text, arrays, laws, fluids, libraries, and lists
+and dictionaries of them."""
 
 
 def write_estimator(
@@ -38,29 +47,23 @@ def write_estimator(
     learner: str,
     parameters: Mapping[str, Any],
     fitted: Mapping[str, Any],
-    types: Sequence[type],
+    types: Types,
 ) -> Path:
     """Write an estimator to a file, replacing it whole or not at all.
 
     Raises InputError if something of it cannot be written.
     """
-    writer = PlainWriter(types)
-    header = {
+    content = {
         "format": FORMAT,
         "version": VERSION,
         "made_by": f"discover {__version__}",
         "learner": learner,
-        "parameters": {k: writer.plain(v, f"The parameter {k!r}") for k, v in parameters.items()},
-        "fitted": {k: writer.plain(v, f"The attribute {k!r}") for k, v in fitted.items()},
+        "parameters": {k: plain(v, types, f"The parameter {k!r}") for k, v in parameters.items()},
+        "fitted": {k: plain(v, types, f"The attribute {k!r}") for k, v in fitted.items()},
     }
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as file:
-        file.writestr(_HEADER, json.dumps(header, allow_nan=False, ensure_ascii=False))
-        for name, values in writer.arrays.items():
-            content = io.BytesIO()
-            np.lib.format.write_array(content, values, allow_pickle=False)
-            file.writestr(f"{name}.npy", content.getvalue())
+    partial.write_bytes(gzip.compress(json.dumps(content, ensure_ascii=False).encode()))
     os.replace(partial, path)
     return path
 
@@ -68,7 +71,7 @@ def write_estimator(
 class EstimatorFile:
     """Content of a file written by `write_estimator`.
 
-    Raises InputError if there is no such file, or it is something else, damaged, or of a later
+    Raises InputError if there is no such file, or it is something else, damaged, or of another
     version.
     """
 
@@ -76,56 +79,38 @@ class EstimatorFile:
         self._path = Path(path)
         # a pipe or a device has no end, and is refused here
         packed = read_bytes(self._path, str(self._path), "Check the path.", largest=_LARGEST)
-        try:
-            with zipfile.ZipFile(io.BytesIO(packed)) as file:
-                _require_small(file)
-                self._header = self._read_header(file)
-                self._arrays = {
-                    info.filename.removesuffix(".npy"): _read_array(file, info)
-                    for info in file.infolist()
-                    if info.filename.endswith(".npy")
-                }
-        except zipfile.BadZipFile:
-            raise self._other() from None
-        except _UNREADABLE as error:
-            if isinstance(error, InputError):
-                raise
-            raise self.damaged(error) from None
-        self.learner = str(self._header.get("learner"))
+        content: Any = None
+        if packed.startswith(b"\x1f\x8b"):  # of gzip
+            try:
+                content = parse_json(_unpacked(packed))
+            except (ValueError, zlib.error) as error:
+                raise self.damaged(error) from None
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise InputError(
+                f"{self._path} is not a complete estimator file. Give a file that "
+                "estimator.save(path) wrote; a law by itself is read elsewhere."
+            )
+        if content.get("version") != VERSION:
+            raise InputError(
+                f"{self._path} was written by {content.get('made_by', 'another version')} in the "
+                f"form {content.get('version')}; this is discover {__version__}, which reads the "
+                f"form {VERSION}. Use that version, or fit again."
+            )
+        self._content = content
+        self.learner = str(content.get("learner"))
 
-    def read(self, types: Sequence[type]) -> tuple[dict[str, Any], dict[str, Any]]:
+    def read(self, types: Types) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the parameters and the fitted attributes, by name."""
-        reader = PlainReader(types, self._arrays)
         try:
             parameters, fitted = (
-                {name: reader.value(value) for name, value in self._header[part].items()}
+                {name: restored(value, types) for name, value in self._content[part].items()}
                 for part in ("parameters", "fitted")
             )
         except InputError as error:  # a law that is not registered here
             raise InputError(f"{self._path}: {error}") from None
-        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        except _DAMAGES as error:
             raise self.damaged(error) from None
         return parameters, fitted
-
-    def _read_header(self, file: zipfile.ZipFile) -> dict[str, Any]:
-        if _HEADER not in file.namelist():
-            raise self._other()
-        header = parse_json(_read(file, file.getinfo(_HEADER)))
-        if not isinstance(header, dict) or header.get("format") != FORMAT:
-            raise self._other()
-        if header.get("version") != VERSION:
-            raise InputError(
-                f"{self._path} was written by {header.get('made_by', 'another version')} in the "
-                f"form {header.get('version')}; this is discover {__version__}, which reads the "
-                f"form {VERSION}. Use that version, or fit again."
-            )
-        return header
-
-    def _other(self) -> InputError:
-        return InputError(
-            f"{self._path} is not a complete estimator file. Give a file that "
-            "estimator.save(path) wrote; a law by itself is read elsewhere."
-        )
 
     def damaged(self, error: Exception) -> InputError:
         """Return the error of a file whose content is not as it was written."""
@@ -136,47 +121,151 @@ class EstimatorFile:
         )
 
 
-_UNREADABLE = (
-    ValueError, EOFError, OSError, zlib.error, RecursionError, NotImplementedError,
-    RuntimeError,  # of a member that is encrypted
-    SyntaxError, TokenError,  # of an array whose head is none
-)  # fmt: skip
+def _unpacked(packed: bytes) -> bytes:
+    """Return what gzip packed, by its checksum; no more than an estimator has is unpacked."""
+    unpacker = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+    content = unpacker.decompress(packed, _LARGEST)
+    if not unpacker.eof:
+        raise ValueError(f"it ends early, or unpacks to more than {_LARGEST / 1e6:.0f} MB")
+    return content
 
 
-def _require_small(file: zipfile.ZipFile) -> None:
-    """Refuse, by the sizes that the file states, what would fill the memory."""
-    members = file.infolist()
-    size = sum(info.file_size for info in members)
-    if len(members) > _MOST_MEMBERS or size > _LARGEST:
-        raise ValueError(
-            f"{len(members)} parts of {size / 1e6:.0f} MB in all, more than an estimator has"
+def plain(value: Any, types: Types, where: str) -> Any:
+    """Return a value as JSON has it; `restored` undoes it.
+
+    `where`: what the value is, for the InputError if it cannot be written.
+    """
+
+    def all_of(items: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: plain(item, types, where) for name, item in items.items()}
+
+    def of_fields(kind: str) -> dict[str, Any]:
+        values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        return {_KIND: kind, "fields": all_of(values)}
+
+    if value is None or isinstance(value, bool | str | int | float):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray | jax.Array):
+        array = np.asarray(value)
+        return {
+            _KIND: "array",
+            "dtype": array.dtype.str,
+            "shape": list(array.shape),
+            "numbers": array.ravel().tolist(),
+        }
+    if isinstance(value, list | tuple):
+        items = [plain(item, types, where) for item in value]
+        return {_KIND: "list" if isinstance(value, list) else "tuple", "items": items}
+    if isinstance(value, Mapping):
+        return {_KIND: "dict", "items": all_of({str(key): item for key, item in value.items()})}
+    if isinstance(value, TermLibrary):
+        return {_KIND: "library", "terms": list(value.names)}
+    if isinstance(value, Fluid):
+        return of_fields("fluid")
+    if isinstance(value, LibraryExpansion):
+        return of_fields("expansion")
+    if isinstance(value, TensorBasisNetwork):
+        network = value.network
+        weights = jax.tree.leaves(eqx.filter(network, eqx.is_array))
+        return {
+            _KIND: "network",
+            # of constants alone there is none
+            "width": 0 if network is None else network.width_size,
+            "depth": 0 if network is None else network.depth,
+            "weights": plain(weights, types, where),
+            "fields": all_of({name: getattr(value, name) for name in _NETWORK_FIELDS}),
+        }
+    if isinstance(value, LawOfEachMode):
+        part, _ = law_parts(value)  # it has a name, or is refused
+        assert part is not None
+        constants = [dict(one) for one in part.constants]
+        return {_KIND: "law_of_each_mode", "name": part.law, "constants": constants}
+    if isinstance(value, AbstractConstitutiveLaw):
+        return _named_law(value, where)
+    if type(value) in types:
+        return of_fields(type(value).__name__)
+    raise InputError(
+        f"{where} is a {type(value).__name__}, which a file cannot hold. Use a value of plain "
+        "numbers, text or arrays, or keep the estimator with pickle."
+    )
+
+
+def _named_law(law: AbstractConstitutiveLaw, where: str) -> dict[str, Any]:
+    found = name_of(law)
+    if found is None:
+        raise InputError(
+            f"{where} holds a law of the kind {type(law).__name__}, which has no name. "
+            f"Register it with register_law before saving; known are {', '.join(LAWS)}."
         )
-    packed = {info.compress_type for info in members}
-    if not packed <= {zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED}:
-        raise ValueError("parts are packed as no estimator's are")
+    name, values = found
+    relaxes = law.linear_relaxation
+    return {_KIND: "named_law", "name": name, "values": values, "linear_relaxation": relaxes}
 
 
-def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
-    try:
-        return file.read(info)
-    except zipfile.BadZipFile as error:  # a checksum that does not fit: ours, but damaged
-        raise ValueError(str(error)) from None
+_NETWORK_FIELDS = ("constants", "network_mask", "invariant_scale", "linear_relaxation", "base")
 
 
-def _read_array(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
-    content = io.BytesIO(_read(file, info))
-    version = np.lib.format.read_magic(content)
-    if version != (1, 0):
-        raise ValueError(f"{info.filename} is in a form of NumPy that no estimator has")
-    shape, _, dtype = np.lib.format.read_array_header_1_0(content, max_header_size=_HEAD)
-    # memory is asked for by the shape, so it has to be that of the content
-    if math.prod(shape) * dtype.itemsize != len(content.getvalue()) - content.tell():
-        raise ValueError(f"{info.filename} has another size than its shape {shape}")
-    content.seek(0)
-    return np.lib.format.read_array(content, allow_pickle=False, max_header_size=_HEAD)
+def restored(content: Any, types: Types) -> Any:
+    """Return the value that `plain` wrote.
+
+    Raises one of `_DAMAGES` where it is damaged.
+    """
+    if not isinstance(content, dict):
+        return content
+    kind = content[_KIND]
+    if kind == "array":
+        dtype = np.dtype(content["dtype"])
+        if dtype.kind not in "biuf":  # of texts one alone may fill the memory
+            raise ValueError(f"an array of {dtype}")
+        return np.array(content["numbers"], dtype).reshape(content["shape"])
+    if kind in ("list", "tuple"):
+        items = [restored(item, types) for item in content["items"]]
+        return items if kind == "list" else tuple(items)
+    if kind == "dict":
+        return {key: restored(item, types) for key, item in content["items"].items()}
+    if kind == "library":
+        return TermLibrary(tuple(parse_term(name) for name in content["terms"]))
+    if kind == "named_law":
+        law = make_law(content["name"], content["values"])
+        relaxes = bool(content["linear_relaxation"])
+        if law.linear_relaxation == relaxes:
+            return law
+        return dataclasses.replace(law, linear_relaxation=relaxes)
+    if kind == "law_of_each_mode":
+        return law_of_each_mode([make_law(content["name"], one) for one in content["constants"]])
+    fields = {key: restored(item, types) for key, item in content["fields"].items()}
+    if kind == "fluid":
+        return Fluid(**fields)
+    if kind in ("network", "expansion"):
+        for name, value in fields.items():
+            fields[name] = jnp.asarray(value) if isinstance(value, np.ndarray) else value
+        if kind == "expansion":
+            return LibraryExpansion(**fields)
+        weights = restored(content["weights"], types)
+        return _network(weights, int(content["width"]), int(content["depth"]), fields)
+    return {one.__name__: one for one in types}[kind](**fields)
 
 
-@dataclass(frozen=True)
+def _network(
+    weights: Sequence[np.ndarray], width: int, depth: int, fields: dict[str, Any]
+) -> TensorBasisNetwork:
+    if not width and not depth and not weights:
+        return TensorBasisNetwork(network=None, **fields)
+    # a network is not made larger than the weights that the file has for it
+    if len(weights) != 2 * (depth + 1) or len(weights[0]) != width:
+        raise ValueError("weights do not fit the network")
+    made = TensorBasisNetwork.initialise(jax.random.key(0), width, depth)
+    dynamic, static = eqx.partition(made.network, eqx.is_array)
+    leaves, structure = jax.tree.flatten(dynamic)
+    if [w.shape for w in weights] != [leaf.shape for leaf in leaves]:
+        raise ValueError("weights do not fit the network")
+    network = eqx.combine(structure.unflatten(map(jnp.asarray, weights)), static)
+    return TensorBasisNetwork(network=network, **fields)
+
+
+@dataclasses.dataclass(frozen=True)
 class Provenance:
     """Data an estimator was fitted to; a saved one holds this in their place."""
 

@@ -20,7 +20,6 @@ from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
 from discover.learners.settings import (
     ARITHMETIC,
-    KnownPart,
     check_settings,
     known_part,
     require_known_rate,
@@ -32,8 +31,6 @@ from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
 
 if TYPE_CHECKING:
-    import xarray
-
     from discover.equations import Equation
     from discover.laws.multimode import Fluid
     from discover.learners.results import LearnerResult
@@ -79,7 +76,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         self._check_parameters()
         known = known_part(self)
         # once, for it may be read only once
-        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
+        runs = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
         require_signal(runs)
         require_known_rate(known, runs)
         self._left = None
@@ -211,34 +208,6 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
             raise file.damaged(error) from None
         return estimator
 
-    def to_xarray(self, X: Iterable[Run] | None = None, seed: int = 0) -> "xarray.Dataset":
-        """Return what the data leave open, with named dimensions, for xarray and ArviZ.
-
-        Of `TensorSINDy` 1,000 draws of the coefficients given its terms, dimensions ``chain``,
-        ``draw``, ``term``. Of `TBNNUDE` what each network predicts, dimensions ``member``,
-        ``sample``: members are no draws from a posterior.
-
-        Parameters
-        ----------
-        X
-            For networks the runs to predict, by default those that were fitted.
-        seed
-            Of the draws.
-
-        Raises
-        ------
-        NotFittedError
-            If nothing was fitted yet.
-        InputError
-            If there is nothing to draw, or xarray is not installed (extra ``xarray``).
-        """
-        from discover.learners.results import labelled_draws, labelled_members
-
-        check_is_fitted(self, "fluid_")
-        if hasattr(self, "members_"):
-            return labelled_members(self, X)
-        return labelled_draws(self, seed)
-
     def predict(self, X: Iterable[Run]) -> Float[np.ndarray, " rows"]:
         """Return what is recorded at the samples of all runs, one run after the other.
 
@@ -291,7 +260,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         """Refuse parameters that only this learner has."""
 
     @abstractmethod
-    def _learn(self, runs: list[Run], known: KnownPart) -> None:
+    def _learn(self, runs: list[Run], known: "Fluid") -> None:
         """Find the law: set the attributes of the fit but those that tell of the runs."""
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:

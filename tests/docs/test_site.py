@@ -94,7 +94,7 @@ def test_every_public_name_is_in_the_reference(site):
 def test_methods_and_results_that_users_hold_are_in_the_reference(site):
     places = set().union(*(page.places for page in site.values()))
     for learner in ("TensorSINDy", "TBNNUDE"):
-        for method in ("fit", "predict", "score", "save", "to_xarray", "equation_"):
+        for method in ("fit", "predict", "score", "save", "equation_"):
             assert f"discover.{learner}.{method}" in places
     for method in ("to_html", "to_dataframe", "to_json", "errors_table"):
         assert f"discover.comparison.comparison.Comparison.{method}" in places

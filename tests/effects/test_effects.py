@@ -17,6 +17,7 @@ from discover.effects import (
     SeriesElement,
     SignalEffect,
     StateEffect,
+    known_effects,
     library_effects,
     make_effect,
     named_effects,
@@ -26,7 +27,7 @@ from discover.errors import InputError
 from discover.forward import data_scales
 from discover.laws import LAWS
 from discover.protocols import start_up
-from tensor_library import from_shear, parse_term
+from tensor_library import from_shear
 
 NAMED = list(named_effects().values())
 STRESS = jnp.array([1.3, -0.2, 0.1, 0.7])
@@ -148,23 +149,6 @@ def test_the_shear_path_of_a_constitutive_effect_agrees_with_full_tensors(effect
     full = effect.extra_term(values, from_shear(STRESS), from_shear(RATE))
     shear = effect.extra_term(values, STRESS, RATE)
     np.testing.assert_allclose(full, from_shear(shear), atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "law", "constant"),
-    [
-        ("giesekus_mobility", 0.3, "giesekus", 0.3),
-        ("non_affine_motion", 0.3, "johnson_segalman", 0.3),
-        ("ptt_linear", 0.3, "ptt_linear", 0.3),
-        ("ptt_exponential", 0.3, "ptt_exponential", 0.3),
-        # of Bird, Dotson & Johnson, q = 1/L²
-        ("finite_extensibility", 1 / 30, "fene_p", 30.0),
-    ],
-)
-def test_an_effect_on_maxwell_is_the_law_of_its_name(name, value, law, constant):
-    added = make_effect(name).extra_term(jnp.array([value]), STRESS, RATE)
-    exact = LAWS[law].build(constant).extra_term(STRESS, RATE)
-    np.testing.assert_allclose(added, exact, rtol=1e-12 if law == "fene_p" else 1e-14)
 
 
 def test_full_constraint_release_keeps_the_trace_of_the_conformation():
@@ -289,26 +273,6 @@ def test_no_library_term_repeats_a_named_effect():
     assert "tr(sigma)*gammadot" in names
 
 
-@pytest.mark.parametrize(
-    "effect",
-    [e for e in NAMED if isinstance(e, ConstitutiveEffect)] + [make_effect("tr(sigma)*gammadot")],
-    ids=lambda effect: effect.name,
-)
-def test_an_effect_written_out_in_library_terms_is_what_it_adds(effect):
-    values = [0.17, 0.4][: len(effect.parameters)]
-    terms = effect.as_terms(values)
-    if terms is None:
-        pytest.skip("no sum of library terms")
-    total = jnp.zeros(4)
-    for term in terms:
-        chosen = {key: jnp.asarray(value) for key, value in term.inner.items()}
-        total = total + term.coefficient * parse_term(term.term).evaluate(STRESS, RATE, chosen)
-    # the same sums in another order: rounding only
-    np.testing.assert_allclose(
-        total, effect.extra_term(jnp.array(values), STRESS, RATE), atol=1e-14
-    )
-
-
 @pytest.mark.parametrize("xi", [0.2, 0.7])
 def test_of_two_slips_that_shear_cannot_tell_apart_one_is_possible(xi):
     flow, times = flow_of(2.0), np.geomspace(0.05, 10.0, 60)
@@ -318,3 +282,34 @@ def test_of_two_slips_that_shear_cannot_tell_apart_one_is_possible(xi):
     assert np.max(np.abs(one.N2 - other.N2)) > 0.1 * np.max(one.N1)
     slip = make_effect("non_affine_motion").parameters[0]
     assert (slip.low, slip.high) == (0.0, 1.0)
+
+
+def test_an_effect_has_the_values_that_were_written_and_the_rest_to_be_fitted():
+    (known,) = known_effects({"edge_fracture": {"critical_strain": 3.0, "loss": "fit"}})
+    # in the order of the dictionary of effects, whatever order they were written in
+    assert known.values == (None, 3.0)
+    assert known.free == ("loss",)
+    assert "to be fitted" in known.text
+
+
+def test_fit_alone_leaves_every_parameter_to_be_fitted():
+    (known,) = known_effects({"stress_gain": "fit"})
+    assert known.values == (None,)
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ({"stress_gian": "fit"}, "Unknown effect 'stress_gian'"),
+        ({"stress_gain": {"gain": 0.1}}, "no parameter 'gain'. Write gain_error"),
+        ({"edge_fracture": {"loss": 0.1}}, "needs critical_strain too"),
+        ({"stress_gain": {"gain_error": 7.0}}, "between -0.8 and 4"),
+        ({"stress_gain": {"gain_error": "free"}}, 'a number or "fit"'),
+        ({"stress_gain": 0.1}, 'must be "fit", or give its parameters: gain_error'),
+        (["stress_gain"], "must name effects with their values"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_sentence(written, words):
+    with pytest.raises(InputError, match="effects") as caught:
+        known_effects(written, "[model] effects")
+    assert words in str(caught.value)

@@ -4,15 +4,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from independent import Structured, oscillation, steps
+from independent import Giesekus, Structured, Thixotropic, UpperConvectedMaxwell, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
 
 from discover import protocols
-from discover.dataset import Run
+from discover.dataset import Dataset, Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.loop import run_loop
 from discover.loop.task import candidates_of
+from discover.protocols import shear_rates, step_rates
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.2
 BUILD_UP, EXPONENT, SLOWNESS, SHARE = 1.5, 0.6, 8.0, 0.3
@@ -197,3 +199,35 @@ def test_a_loop_that_is_not_asked_for_a_structure_tries_moores_alone(asked):
     assert "thixotropy" in names
     assert names.isdisjoint(FAMILY)
     assert [effect.name for effect in candidates_of(list(FAMILY))] == list(FAMILY)
+
+
+HALVES = np.append(np.geomspace(0.05, 6.0, 20), 6.0 + np.geomspace(0.05, 6.0, 20))
+STEPS = ((0.3, 3.0), (1.0, 0.2), (4.0, 0.5))
+CANDIDATES = (
+    "thixotropy", "thixotropic_modulus", "thixotropic_relaxation",
+    "thixotropic_relaxation_two_times", "giesekus_mobility",
+)  # fmt: skip
+FLUIDS = {
+    "giesekus_mobility": Giesekus(0.3, 100.0, 1.0),
+    "thixotropy": Thixotropic(UpperConvectedMaxwell(100.0, 1.0), 0.3, 4.0),
+    "thixotropic_relaxation": Structured(0.4, (3.0,), 0.6, mobility=0.0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FLUIDS)
+def test_a_loop_names_what_is_in_the_fluid_and_no_structure_with_more_constants(name):
+    generator = np.random.default_rng(0)
+    runs = []
+    for rates in STEPS:
+        flow = step_rates([0.0, 6.0], rates)
+        stress = FLUIDS[name].respond(steps([0.0, 6.0], rates), HALVES).sigma12
+        noise = 0.01 * np.sqrt(np.mean(stress**2)) * generator.standard_normal(len(HALVES))
+        run = Run(str(rates), HALVES, flow, shear_rates(flow, HALVES), stress + noise)
+        runs.append(run)
+    result = run_loop(
+        Dataset(name, tuple(runs)), DeclaredModel.maxwell(100.0, 1.0), effects=CANDIDATES,
+        max_effects=2, explanations=1,
+    )  # fmt: skip
+    assert [stage.effect for stage in result.stages] == [name]
+    assert result.verdict == "effects_added"

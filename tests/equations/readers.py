@@ -70,22 +70,27 @@ def product_of(parts):
     return product
 
 
-def value(tree, letters):
-    """Return the value of a tree of LaTeX, with matrices for the tensors."""
+def value(tree, letters, of_tensors=False):
+    """Return the value of a tree of SymPy, with matrices for the tensors.
+
+    `of_tensors`: whether its powers may be of tensors, as in expressions, and not in LaTeX.
+    """
     if tree.is_Symbol:
         return letters[tree.name]
     if tree.is_number:
         return float(tree)
-    parts = [value(part, letters) for part in tree.args]
+    parts = [value(part, letters, of_tensors) for part in tree.args]
     if tree.is_Add:
         assert len({np.shape(part) for part in parts}) == 1, f"scalar plus tensor in {tree}"
         return sum(parts)
     if tree.is_Mul:
         return product_of(parts)
+    if tree.is_Pow and of_tensors and np.ndim(parts[0]):
+        return np.linalg.matrix_power(parts[0], int(parts[1]))
     if tree.is_Pow:
         assert np.ndim(parts[0]) == np.ndim(parts[1]) == 0, f"power of a tensor in {tree}"
         return parts[0] ** parts[1]
-    known = {"exp": np.exp, "Abs": abs, "T": np.trace, "M": max}
+    known = {"exp": np.exp, "Abs": abs, "T": np.trace, "Trace": np.trace, "M": max}
     return known[tree.func.__name__](*parts)
 
 

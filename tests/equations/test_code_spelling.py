@@ -9,33 +9,16 @@ import sympy
 from readers import (
     in_ufl,
     module_of,
-    product_of,
     rheotool_modes,
     sum_of_spelled,
     ufl_number,
+    value,
 )
 from spelled_laws import BOTH_SIGNS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
 
 from discover.equations import Equation, equation_from_json, write_equation
 from discover.errors import InputError
 from tensor_library import LawTerm, parse_term
-from tensor_library.sympy_notation import RATE, STRESS, UNIT, Trace
-
-
-def _value(expression, letters):
-    if expression in letters:
-        return letters[expression]
-    if expression.is_number:
-        return float(expression)
-    parts = [_value(part, letters) for part in expression.args]
-    if expression.is_Add:
-        return sum(parts)
-    if expression.is_Mul:
-        return product_of(parts)
-    if expression.is_Pow:
-        base, exponent = parts
-        return np.linalg.matrix_power(base, int(exponent)) if np.ndim(base) else base**exponent
-    return {Trace: np.trace, sympy.exp: np.exp, sympy.Abs: abs}[expression.func](*parts)
 
 
 def _by_python(equation):
@@ -57,8 +40,8 @@ def _by_sympy_text(equation):
 
 def _by_sympy_expression(equation):
     expression = equation.sympy()
-    letters = ({STRESS: stress, RATE: rate, UNIT: np.eye(3)} for stress, rate in STATES)
-    return [_value(expression, one) + np.zeros((3, 3)) for one in letters]
+    letters = ({"sigma": s, "gammadot": d, "I": np.eye(3)} for s, d in STATES)
+    return [value(expression, one, True) + np.zeros((3, 3)) for one in letters]
 
 
 def _by_json(equation):

@@ -13,97 +13,49 @@ from spelled_laws import BOTH_SIGNS, LIBRARY_LAWS, STATES, agree, sum_of
 
 from discover.equations.spelling.markup import _TENSORS, law_element, term_element, term_mathml
 
-_FUNCTIONS = {"tr": np.trace, "exp": np.exp}
-_SUMS = ("+", "−")
+_SIGNS = {"−": "-", "·": "@", "×": "*", "+": "+", "(": "(", ")": ")", "\u2061": ""}
 
 
-def drawn(element):
-    """Return what an element draws, in a row."""
+def words(element):
+    """Return what an element draws, in a row, in the words of Python."""
+    rows = [words(child) for child in element]
     if element.tag in ("math", "mrow"):
-        return [one for child in element for one in drawn(child)]
-    return [] if element.tag == "mspace" else [element]
+        return [word for row in rows for word in row]
+    if element.tag == "mfrac":
+        above, below = rows
+        return ["((", *above, ")/(", *below, "))"]
+    if element.tag == "msup":
+        base, exponent = rows
+        # a superscript belongs to what stands right before it: one thing, or one bracket
+        assert len(base) == 1 or (base[0], base[-1]) == ("(", ")")
+        return [*base, "**", *exponent]
+    if element.tag == "mspace":
+        return []
+    if element.tag == "mo" and element.text != "|":
+        return [_SIGNS[element.text]]
+    return [element.text]
 
 
-class Reader:
-    """Evaluates a row by the precedence of the page: sums, then products, then superscripts."""
-
-    def __init__(self, row, letters):
-        self.row, self.letters, self.at = row, letters, 0
-        self.closing = [None]
-
-    def symbol(self):
-        if self.at == len(self.row):
-            return None
-        element = self.row[self.at]
-        return element.text if element.tag == "mo" else ""
-
-    def sum(self):
-        sign = 1.0
-        if self.symbol() in _SUMS:
-            sign = -1.0 if self.symbol() == "−" else 1.0
-            self.at += 1
-        total = sign * self.product()
-        while self.symbol() in _SUMS:
-            sign = -1.0 if self.symbol() == "−" else 1.0
-            self.at += 1
-            summand = self.product()
-            assert np.shape(total) == np.shape(summand), "scalar plus tensor"
-            total = total + sign * summand
-        return total
-
-    def product(self):
-        product = self.factor()
-        while self.symbol() not in (*_SUMS, self.closing[-1]):
-            if self.symbol() in ("·", "×"):
-                self.at += 1
-            factor = self.factor()
-            both = np.ndim(product) and np.ndim(factor)
-            product = product @ factor if both else product * factor
-        return product
-
-    def factor(self):
-        element = self.row[self.at]
-        self.at += 1
-        if element.tag == "mn":
-            return float(element.text)
-        if element.tag == "mfrac":
-            above, below = (Reader(drawn(one), self.letters).all() for one in element)
-            return above / below
-        if element.tag == "msup":
-            base, exponent = (Reader(drawn(one), self.letters).all() for one in element)
-            # a superscript belongs to what stands right before it: one thing, or one bracket
-            row = drawn(element[0])
-            assert len(row) == 1 or (row[0].text == "(" and row[-1].text == ")")
-            assert np.ndim(base) == 0
-            return base**exponent
-        if element.tag == "mi" and element.text in _FUNCTIONS:
-            assert self.symbol() == "\u2061"
-            self.at += 1
-            assert self.symbol() == "(", f"{element.text} of what?"
-            return _FUNCTIONS[element.text](self.factor())
-        if element.tag == "mi":
-            return self.letters[element.text]
-        assert element.text in ("(", "|"), f"cannot read {element.text!r}"
-        self.closing.append({"(": ")", "|": "|"}[element.text])
-        inside = self.sum()
-        assert self.symbol() == self.closing.pop()
-        self.at += 1
-        return inside if element.text == "(" else abs(inside)
-
-    def all(self):
-        value = self.sum()
-        assert self.at == len(self.row)
-        return value
+def said(row):
+    """Return a row as an expression; what stands side by side is multiplied."""
+    text, bars = "", 0
+    for word in row:
+        if word == "|":
+            bars += 1
+            word = "abs(" if bars % 2 else ")"
+        begins = word[:1] == "(" or word[:1].isalnum()
+        ends = text[-1:] == ")" or text[-1:].isalnum() or text.endswith("\u0307")
+        applied = text.endswith(("tr", "exp"))
+        text += "*" * (begins and ends and not applied) + word
+    return text
 
 
 def read(mathml, **letters):
     """Return the value at every state."""
-    element = ElementTree.fromstring(mathml)
-    found = []
-    for stress, rate in STATES:
-        known = {"σ": stress, "γ̇": rate, "I": np.eye(3), **letters}
-        found.append(Reader(drawn(element), known).all())
-    return np.array(found)
+    text = said(words(ElementTree.fromstring(mathml)))
+    known = {"tr": np.trace, "exp": np.exp, **letters}
+    states = ({"σ": stress, "γ̇": rate, "I": np.eye(3)} for stress, rate in STATES)
+    return np.array([eval(text, known | state) for state in states])
 
 
 def relaxation(law):

@@ -18,7 +18,7 @@ from discover.identify.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes
 from discover.laws.registry import check_law
-from discover.learners.plain_values import PlainReader, PlainWriter
+from discover.learners.files import plain, restored
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import trajectories
@@ -170,7 +170,5 @@ def test_learners_start_from_the_law_of_each_mode():
 
 
 def test_a_law_of_each_mode_goes_through_a_file():
-    writer = PlainWriter(())
-    plain = writer.plain(giesekus(), "law")
-    again = PlainReader((), writer.arrays).value(plain)
+    again = restored(plain(giesekus(), (), "law"), ())
     assert np.asarray(again.law.mobility) == pytest.approx(MOBILITIES)

@@ -9,22 +9,6 @@ from discover.protocols import in_flow, start_up
 from discover.simulate import SimulationError, simulate
 
 
-def test_linear_ptt_is_the_first_order_of_the_exponential():
-    stress, rate = jnp.array([0.3, 0.0, 0.0, 0.2]), jnp.zeros(4)
-    differences = [
-        float(
-            jnp.max(
-                jnp.abs(
-                    make_law("ptt_exponential", {"epsilon": e}).extra_term(stress, rate)
-                    - make_law("ptt_linear", {"epsilon": e}).extra_term(stress, rate)
-                )
-            )
-        )
-        for e in (0.02, 0.01)
-    ]
-    assert differences[0] / differences[1] == pytest.approx(4.0, rel=0.02)  # second order in ε
-
-
 def test_the_network_is_objective_for_random_weights():
     law = TensorBasisNetwork.initialise(jax.random.key(0))
     a = jax.random.normal(jax.random.key(1), (3, 3))

@@ -1,6 +1,5 @@
 """The pom-pom law, with its structure variable, against full tensors in scipy and closed forms."""
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -74,27 +73,6 @@ def test_two_modes_are_those_of_full_tensors_in_every_flow(name, kind, rate):
     wanted = stress[:, 0, 1] if kind == "shear" else stress[:, 0, 0] - stress[:, 1, 1]
     # fixed steps of a fit; fading growth has kinks, at which one step's error is of second order
     np.testing.assert_allclose(found, wanted, atol=5e-4 * np.max(np.abs(wanted)))
-
-
-def test_the_error_of_fixed_steps_falls_with_their_fourth_power():
-    wanted = exact("pom_pom_drag_strain", 0.8 * UNIT["shear"])[-1][[0, 1, 2, 0], [0, 1, 2, 1]]
-    fluid = Fluid.dimensionless(make_law("pom_pom_drag_strain", CONSTANTS))
-    errors = []
-    for steps in (20, 40, 80):
-        state, h = fluid.rest(), 4.0 / steps
-
-        @jax.jit
-        def slope(y):
-            return fluid.state_rate(y, jnp.asarray(0.8))
-
-        for _ in range(steps):
-            k1 = slope(state)
-            k2 = slope(state + 0.5 * h * k1)
-            k3 = slope(state + 0.5 * h * k2)
-            state = state + h / 6.0 * (k1 + 2 * k2 + 2 * k3 + slope(state + h * k3))
-        errors.append(np.max(np.abs(state[0, :4] - wanted)))
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert np.all(orders > 3.5)
 
 
 @pytest.mark.parametrize(

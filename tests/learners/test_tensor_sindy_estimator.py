@@ -8,7 +8,6 @@ from shared_flows import LIBRARY, small_dataset, with_normal_stresses
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, cross_val_score
 
-from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus, LibraryExpansion
 from discover.learners.tensor_sindy import OPTIMISERS, TensorSINDy
@@ -221,13 +220,7 @@ def test_refitting_forgets(giesekus):
 @pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize(
     ("parameters", "message"),
-    [
-        ({"optimizer": "magic"}, "Unknown optimizer"),
-        ({"modulus": -1.0}, "modulus must be positive"),
-        ({"modulus": [1.0, 2.0]}, "one value for each mode"),
-        ({"library": ["sigma"]}, "TermLibrary"),
-        ({"max_terms": 0}, "max_terms"),
-    ],
+    [({"library": ["sigma"]}, "TermLibrary"), ({"max_terms": 0}, "max_terms")],
 )
 def test_bad_parameters_give_one_clear_error(parameters, message):
     with pytest.raises(InputError, match=message):
@@ -235,13 +228,7 @@ def test_bad_parameters_give_one_clear_error(parameters, message):
 
 
 @pytest.mark.usefixtures("as_users_run_it")
-def test_bad_runs_give_one_clear_error():
-    with pytest.raises(InputError, match="at least one run"):
-        TensorSINDy().fit([])
-    with pytest.raises(InputError, match="Run"):
-        TensorSINDy().fit([1.0, 2.0])
-    run = next(iter(small_dataset("ucm")))
-    silent = replace(run, stress=np.zeros_like(run.stress))
-    assert isinstance(silent, Run)
-    with pytest.raises(InputError, match="zero throughout"):
-        TensorSINDy().fit([silent])
+@pytest.mark.parametrize(("runs", "message"), [([], "at least one run"), ([1.0, 2.0], "Run")])
+def test_bad_runs_give_one_clear_error(runs, message):
+    with pytest.raises(InputError, match=message):
+        TensorSINDy().fit(runs)

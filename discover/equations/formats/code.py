@@ -10,11 +10,11 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
-from tensor_library.notation import TextNotation, printed
+from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
 
-class CodeNotation(TextNotation):
+class CodeNotation(Notation):
     """numpy, and what the other texts in Python share with it."""
 
     tensors = {"I": "unit", "sigma": "s", "gammadot": "d"}  # noqa: RUF012
@@ -319,7 +319,8 @@ def filled(
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes=repr([(float(g), float(time)) for g, time in pairs]),
-        solvent=repr(float(equation.solvent_viscosity)), tested=_tested(equation),
+        solvent=repr(float(equation.solvent_viscosity)),
+        tested=repr(equation.tested and equation.tested.boxes),
         constants=constants or "",
         mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
         also=", variables" if variables else "", also_k=", variables[k]" if variables else "",
@@ -364,15 +365,3 @@ def _constants(equation: Equation) -> str:
 
 def _numbers(values: Sequence[float]) -> str:
     return repr([float(value) for value in values])
-
-
-def _tested(equation: Equation) -> str:
-    tested = equation.tested
-    if tested is None:
-        return "None"
-    boxes = {"learned_in": tested.learned_in, "judged_in": tested.judged_in}
-    ends = {
-        name: box and {"Wi": [*map(float, box.weissenberg)], "De": [*map(float, box.deborah)]}
-        for name, box in boxes.items()
-    }
-    return repr(ends)

@@ -7,7 +7,7 @@ from discover.equations.parts import NamedPart
 from tensor_library import LawTerm, parse_term
 from tensor_library.notation import (
     LatexNotation,
-    TextNotation,
+    Notation,
     greek_letter,
     latex_number,
     printed,
@@ -59,7 +59,7 @@ def law_latex(
 
 
 def _named(
-    named: NamedPart, notation: TextNotation, letters: Mapping[str, str], rate: str
+    named: NamedPart, notation: Notation, letters: Mapping[str, str], rate: str
 ) -> tuple[Sequence[str], list[tuple[str, str]]]:
     """Return the summands of a named law, and what its rates, scalars and constants are."""
     function, fixed = named.function, named.constants[0]
@@ -113,7 +113,7 @@ def number(value: float) -> str:
     return body
 
 
-class MathmlNotation(TextNotation):
+class MathmlNotation(Notation):
     """Presentation MathML, without `math` element."""
 
     tensors = _TENSORS

@@ -16,12 +16,10 @@ class UpperConvectedMaxwell(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = 0."""
         del rate
         return jnp.zeros_like(stress)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return ()
 
 
@@ -32,11 +30,9 @@ class JohnsonSegalman(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
         return 0.5 * self.slip_parameter * anticommutator(stress, rate)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return (LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter)),)
 
 
@@ -47,12 +43,10 @@ class Giesekus(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = α σ·σ."""
         del rate  # this law has no explicit rate dependence
         return self.mobility * square(stress)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return (LawTerm("sigma.sigma", float(self.mobility)),)
 
 
@@ -63,12 +57,10 @@ class LinearPhanThienTanner(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = ε tr(σ) σ."""
         del rate
         return self.extensibility * trace(stress) * stress
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return (LawTerm("tr(sigma)*sigma", float(self.extensibility)),)
 
 
@@ -79,12 +71,11 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = (exp(ε tr σ) − 1) σ."""
         del rate
-        return jnp.expm1(self.extensibility * trace(stress)) * stress
+        # beyond exp(60) a trial is absurd; the cap keeps it finite, to be rejected for its misfit
+        return jnp.expm1(jnp.minimum(self.extensibility * trace(stress), 60.0)) * stress
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         inner = {"epsilon": float(self.extensibility)}
         return (LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
 
@@ -121,19 +112,18 @@ class FenePeterlin(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ, γ̇) as above."""
-        limit = self.maximum_extension_squared
-        trace_of_stress = trace(stress)
-        factor = 1.0 + trace_of_stress / limit
-        trace_of_conformation = (trace_of_stress + 3.0) / factor
-        factor_rate = (inner(stress, rate) - factor * trace_of_stress) / (
-            limit - trace_of_conformation
-        )
-        return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
+        return fene_p(1.0 / self.maximum_extension_squared, stress, rate)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
-        """Return h as a sum of library terms."""
         return fene_p_terms(1.0 / float(self.maximum_extension_squared))
+
+
+def fene_p(inverse: Float[Array, ""], stress: Symmetric, rate: Symmetric) -> Symmetric:
+    """Return h of FENE-P with q = 1/L²: q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q)."""
+    stretch = trace(stress)
+    factor = 1.0 + inverse * stretch
+    growth = inverse * (inner(stress, rate) - factor * stretch) / (1.0 - 3.0 * inverse)
+    return inverse * stretch * stress - growth * (stress + identity_like(stress))
 
 
 def fene_p_terms(inverse: float) -> tuple[LawTerm, ...]:
@@ -154,6 +144,23 @@ def _written_fene_p() -> IsotropicFunction:
     # with L² − tr A = (L² − 3)/f
     where = {"f": 1 + trace / limit, "w": (power - f * trace) / (limit - 3)}
     return IsotropicFunction({"sigma": f - 1 - w, "I": -w}, where, {"L2": "L^{2}"})
+
+
+class NonAffine(AbstractConstitutiveLaw):
+    """A law with (ξ/2)(σ·γ̇ + γ̇·σ) added to its h   [Johnson & Segalman 1977, JNNFM 2, 255]."""
+
+    affine: AbstractConstitutiveLaw
+    slip_parameter: Float[Array, ""] = eqx.field(converter=as_parameter)  # ξ, 0 to 2
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        slip = 0.5 * self.slip_parameter * anticommutator(stress, rate)
+        return self.affine.extra_term(stress, rate) + slip
+
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
+        slip = LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
+        affine = self.affine.as_terms()
+        return None if affine is None else (*affine, slip)
 
 
 NAMED = {
@@ -207,4 +214,32 @@ NAMED = {
         source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
         written=_written_fene_p,
     ),
+}
+
+
+def _with_slip(named: NamedLaw) -> NamedLaw:
+    slip = NAMED["johnson_segalman"]
+
+    def build(constant, xi) -> NonAffine:
+        return NonAffine(affine=named.build(constant), slip_parameter=xi)
+
+    def written() -> IsotropicFunction:
+        assert named.written is not None
+        assert slip.written is not None
+        affine, slipping = named.written(), slip.written()
+        return IsotropicFunction({**affine.coefficients, **slipping.coefficients}, affine.where)
+
+    return NamedLaw(
+        f"{named.title} with slip",
+        build,
+        {**named.parameters, **slip.parameters},
+        {**named.range_sources, **slip.range_sources},
+        source=f"{named.source}; {slip.source}",
+        written=written,
+    )
+
+
+NAMED |= {
+    f"{name}_non_affine": _with_slip(NAMED[name])
+    for name in ("giesekus", "ptt_linear", "ptt_exponential")
 }

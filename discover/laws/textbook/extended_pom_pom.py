@@ -32,7 +32,6 @@ class ExtendedPomPom(AbstractConstitutiveLaw):
     retracts: ClassVar[bool] = True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ) as above."""
         del rate
         stretch = stretch_of(stress)
         withdrawn = jnp.exp(2.0 / self.arms * (stretch - 1.0))

@@ -31,7 +31,6 @@ class RoliePoly(AbstractConstitutiveLaw):
     retracts: ClassVar[bool] = True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ) as above."""
         del rate
         stretch = stretch_of(stress)
         retraction = 2.0 / self.stretch_time_ratio * (1.0 - 1.0 / stretch)
@@ -137,7 +136,6 @@ class RoliePolyBlend(AbstractConstitutiveLaw):
         return jnp.concatenate([jnp.zeros((1, 2)), of_pairs])
 
     def shares(self) -> Float[Array, "4"]:
-        """Return φ_i φ_j."""
         share = jnp.stack([self.long_fraction, 1.0 - self.long_fraction])
         return (share[:, None] * share[None, :]).ravel()
 

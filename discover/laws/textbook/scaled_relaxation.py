@@ -20,7 +20,6 @@ class Saramito(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ) as above."""
         del rate
         deviator = stress - trace(stress) / 3.0 * identity_like(stress)
         squared = 0.5 * inner(deviator, deviator)
@@ -52,7 +51,6 @@ class WhiteMetzner(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ, γ̇) as above."""
         squared = self.onset**2 * 0.5 * inner(rate, rate)
         return ((1.0 + squared) ** (0.5 * (1.0 - self.exponent)) - 1.0) * stress
 

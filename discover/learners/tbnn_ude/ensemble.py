@@ -8,20 +8,18 @@ compiled programs of the first.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
-from discover.laws import Fluid, TensorBasisNetwork
+from discover.laws import TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
 from discover.learners.tbnn_ude.recipes import train_along, train_constants
 from discover.learners.tbnn_ude.session import Progress
-from discover.protocols.protocol import FlowProtocol
-from discover.simulate.solve import SimulationError, observe
 
 FITS = 1.25
 """A member whose misfit is so many times the least is no explanation of the data.
@@ -117,37 +115,3 @@ def member_misfits(
     """Return the relative misfit of every law; infinite where it diverges."""
     misfits = np.array([np.linalg.norm(np.asarray(law_misfit(law, problem))) for law in laws])
     return np.where(np.isfinite(misfits), misfits, np.inf)
-
-
-@dataclass(frozen=True)
-class MemberPredictions:
-    """Predictions of every member of an ensemble in one flow.
-
-    `sigma12`, `N1`, `N2` in Pa, shape (members, n); nan throughout for a member that diverges.
-    """
-
-    times: Float[np.ndarray, " n"]  # in s, shape (n,)
-    sigma12: Float[np.ndarray, "members n"]
-    N1: Float[np.ndarray, "members n"]
-    N2: Float[np.ndarray, "members n"]
-
-    def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """Return the lowest and highest ``sigma12``, ``N1`` or ``N2`` at each time."""
-        values = getattr(self, quantity)
-        kept = values[~np.any(np.isnan(values), axis=1)]
-        if not len(kept):
-            return np.full(self.times.shape, np.nan), np.full(self.times.shape, np.nan)
-        return np.min(kept, axis=0), np.max(kept, axis=0)
-
-
-def member_predictions(
-    fluids: Sequence[Fluid], protocol: FlowProtocol, times: Float[np.ndarray, " n"]
-) -> MemberPredictions:
-    """Return what is recorded of every member in a flow, and its normal stress differences."""
-    rows = np.full((3, len(fluids), len(times)), np.nan)
-    for i, fluid in enumerate(fluids):
-        try:
-            rows[:, i] = observe(fluid, protocol, times).T
-        except SimulationError:
-            continue  # that it diverged is the answer
-    return MemberPredictions(np.asarray(times, dtype=float), *rows)

@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Float
-from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
@@ -20,7 +18,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
-from discover.learners.settings import KnownPart, PerMode, default_library
+from discover.learners.settings import PerMode, default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
@@ -33,8 +31,7 @@ from discover.learners.tbnn_ude.problem import (
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
-from discover.protocols.protocol import FlowProtocol
-from tensor_library import TENSOR_NAMES, TermLibrary
+from tensor_library import TENSOR_NAMES, TermLibrary, parse_term
 
 RECIPES = ("default", "thorough", "paper")
 
@@ -123,18 +120,18 @@ class TBNNUDE(RunPrediction):
     base: Fluid | None = None
     solvent_viscosity: float = 0.0
 
-    def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
+    def _learn(self, runs: list[Run], known: Fluid, shorten: bool = True) -> None:
         started = time.perf_counter()
         recipe = self._recipe()
         whole = held = problem = _problem(runs, known)
         followed, fitted = runs, ""
         if isinstance(recipe, DefaultRecipe):
-            if shorten and known.linear_relaxation:
+            if shorten and known.law.linear_relaxation:
                 followed, problem = shorter_where_it_pays(
                     runs,
                     whole,
                     lambda shorter: _problem(shorter, known),
-                    known.relaxation_time,
+                    np.asarray(known.relaxation_time),
                     recipe.affordable,
                 )
             held = problem
@@ -156,9 +153,9 @@ class TBNNUDE(RunPrediction):
         self.ensemble_ = agreement
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
-        modes = np.asarray(known.modulus), problem.relaxation_time, float(known.solvent_viscosity)
-        self.fluid_ = Fluid(best.law, *modes)
-        self.ensemble_fluids_ = [Fluid(law, *modes) for law in members]
+        modes = replace(known, modulus_covariance=None)
+        self.fluid_ = replace(modes, law=best.law)
+        self.ensemble_fluids_ = [replace(modes, law=law) for law in members]
         shortened = ""
         if followed is not runs:
             recorded = self._predict_runs(runs), self._predict_runs(list(followed))
@@ -196,19 +193,6 @@ class TBNNUDE(RunPrediction):
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
 
-    def predict_members(
-        self, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
-    ) -> ensemble.MemberPredictions:
-        """Return σ12, N1 and N2 of every member in a flow, with their bands.
-
-        Parameters
-        ----------
-        protocol, times
-            Any flow, also one that no training saw; times in s, shape (n,), from 0 on.
-        """
-        check_is_fitted(self, "ensemble_fluids_")
-        return ensemble.member_predictions(self.ensemble_fluids_, protocol, times)
-
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):
             return self.recipe
@@ -224,7 +208,7 @@ class TBNNUDE(RunPrediction):
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
     def _train_all(
-        self, problem: TrainingProblem, keys, recipe, known: KnownPart
+        self, problem: TrainingProblem, keys, recipe, known: Fluid
     ) -> tuple[list[Trained], str]:
         """Return all members, and how they came about."""
         say = by_steps(self.progress)
@@ -241,11 +225,11 @@ class TBNNUDE(RunPrediction):
         others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
-    def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart, say) -> Trained:
-        relaxes = known.linear_relaxation
+    def _train(self, problem: TrainingProblem, key, recipe, known: Fluid, say) -> Trained:
+        relaxes, below = known.law.linear_relaxation, law_below(known)
         if isinstance(recipe, DefaultRecipe):
-            return train_default(problem, key, relaxes, recipe, say, known.law)
-        law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=known.law)
+            return train_default(problem, key, relaxes, recipe, say, below)
+        law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=below)
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, misfit, True, message)
@@ -255,11 +239,10 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> TrainingProblem:
-    return make_problem(
-        runs, known.modulus, known.relaxation_time, solvent_viscosity=known.solvent_viscosity,
-        known_relaxation=known.linear_relaxation, base=known.law, **limits,
-    )  # fmt: skip
+def _problem(runs: Sequence[Run], known: Fluid, **limits: float) -> TrainingProblem:
+    modes = np.asarray(known.modulus), np.asarray(known.relaxation_time)
+    viscosity = float(known.solvent_viscosity)
+    return make_problem(runs, *modes, solvent_viscosity=viscosity, base=known.law, **limits)
 
 
 _WORTH_TRAINING_ON = 1.5
@@ -267,7 +250,7 @@ _WORTH_TRAINING_ON = 1.5
 
 
 def _rougher(
-    problem: TrainingProblem, runs: Sequence[Run], known: KnownPart, samples: int
+    problem: TrainingProblem, runs: Sequence[Run], known: Fluid, samples: int
 ) -> tuple[TrainingProblem, str]:
     """Return a problem of fewer samples and longer steps, and what was left out in words."""
     fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
@@ -276,7 +259,7 @@ def _rougher(
         problem = _problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
     limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
-    if limits is not None and known.linear_relaxation:
+    if limits is not None and known.law.linear_relaxation:
         rough = _problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
         if share >= _WORTH_TRAINING_ON:
@@ -304,27 +287,19 @@ def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[
 
 
 def _terms(projection: Projection, trained: Trained, cloud: Cloud) -> tuple[RecoveredTerm, ...]:
-    library = projection.library
-    if library is None:
+    if not projection.terms:
         return ()
+    chosen = TermLibrary(tuple(parse_term(term.term) for term in projection.terms))
     # the same terms in the law as the prior left it
-    shrunk = project(trained.penalised_law, cloud, library, max_terms=len(library))
-    penalised = (
-        {}
-        if shrunk.library is None
-        else dict(zip(shrunk.library.names, shrunk.coefficients, strict=True))
-    )
-    inner = {
-        form.inner_name: float(value)
-        for form, value in zip(library.forms, projection.inner, strict=True)
-    }
+    shrunk = project(trained.penalised_law, cloud, chosen, max_terms=len(chosen))
+    penalised = {term.term: term.coefficient for term in shrunk.terms}
     return tuple(
         RecoveredTerm(
-            term=term.name,
-            coefficient=float(coefficient),
-            coefficient_penalised=float(penalised.get(term.name, 0.0)),
-            inner={name: inner[name] for name in term.inner_names},
+            found.term,
+            found.coefficient,
+            found.inner,
+            coefficient_penalised=penalised.get(found.term, 0.0),
             latex=term.latex(),
         )
-        for term, coefficient in zip(library.terms, projection.coefficients, strict=True)
+        for found, term in zip(projection.terms, chosen.terms, strict=True)
     )

@@ -5,13 +5,12 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.least_squares import Cloud
 from discover.programs import compiled, on_device
-from tensor_library.library import TermLibrary
+from tensor_library import LawTerm, TermLibrary
 
 ENOUGH = 1e-3
 """Relative misfit of the extra term below which more terms say nothing."""
@@ -28,9 +27,7 @@ class Projection:
         that training visited, each with the weight that the record gives its mode.
     """
 
-    library: TermLibrary | None
-    coefficients: Float[np.ndarray, " n"]  # their least-squares coefficients, shape (n,)
-    inner: Float[np.ndarray, " m"]  # inner parameters of the chosen terms' closed forms
+    terms: tuple[LawTerm, ...]  # with least-squares coefficients; none of a law that adds nothing
     misfit: float
 
 
@@ -48,7 +45,7 @@ def project(
     target = (weight * np.asarray(_own_term(law, cloud.stress, cloud.rate))).ravel()
     norm = float(np.linalg.norm(target))
     if norm < 1e-12 or not np.isfinite(norm):
-        return Projection(None, np.zeros(0), np.zeros(0), 0.0 if norm < 1e-12 else np.inf)
+        return Projection((), 0.0 if norm < 1e-12 else np.inf)
 
     def design(inner):
         values = np.asarray(_terms(library, cloud.stress, cloud.rate, on_device(inner)))
@@ -94,11 +91,12 @@ def project(
             break
         support.remove(weakest)
         misfit = without[weakest]
-    if not support:
-        return Projection(None, np.zeros(0), np.zeros(0), misfit)
-    chosen = library.subset(support)
-    kept = [inner[i] for i, form in enumerate(library.forms) if form in chosen.forms]
-    return Projection(chosen, _solve(matrix[:, support], target), np.array(kept), misfit)
+    of_forms = dict(zip(library.inner_names, map(float, inner), strict=True))
+    terms = []
+    for j, value in zip(support, _solve(matrix[:, support], target), strict=True):
+        term = library.terms[j]
+        terms.append(LawTerm(term.name, float(value), {n: of_forms[n] for n in term.inner_names}))
+    return Projection(tuple(terms), misfit)
 
 
 @compiled

@@ -1,7 +1,7 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,20 +11,20 @@ from pysindy.optimizers import BaseOptimizer
 from discover.dataset.run import Run
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.left_out import left_out
-from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion
+from discover.laws import AbstractConstitutiveLaw, Fluid
+from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import KnownPart, PerMode, check_library, default_library
+from discover.learners.settings import PerMode, check_library, default_library, law_below
 from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.search import (
     SupportSearch,
     library_problem,
 )
-from discover.programs import on_device
 from discover.progress import Progress, by_lines
-from tensor_library.library import TermLibrary
+from tensor_library import LawTerms, TermLibrary
 
 _ROUNDS = 8
 """Lines of text that a search is expected to say."""
@@ -123,7 +123,7 @@ class TensorSINDy(RunPrediction):
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
     random_state: int = 0
 
-    def _learn(self, runs: list[Run], known: KnownPart) -> None:
+    def _learn(self, runs: list[Run], known: Fluid) -> None:
         started = time.perf_counter()
         library = default_library() if self.library is None else self.library
         problem = library_problem(runs, library, known, self.use_normal_stresses)
@@ -140,17 +140,10 @@ class TensorSINDy(RunPrediction):
         self.library_ = library
         self.terms_ = report.recovered_terms(search, chosen)
         self.covariance_ = report.covariance_of_terms(search, chosen)
-        self.coefficients_ = np.zeros(len(library))
-        self.inner_ = np.array(library.inner_default, dtype=float)
-        for term in self.terms_:
-            self.coefficients_[library.names.index(term.term)] = term.coefficient
-            for name, value in term.inner.items():
-                self.inner_[library.inner_names.index(name)] = value
-        self.law_ = _law(library, search.support(chosen), self.coefficients_, self.inner_, known)
-        fluid = known.fluid
-        self.fluid_ = Fluid(
-            self.law_, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity
-        )
+        terms = LawTerms.of(self.terms_)
+        self.coefficients_, self.inner_ = terms.over(library)
+        self.law_ = law_of_terms(terms, known.law.linear_relaxation, law_below(known))
+        self.fluid_ = replace(known, law=self.law_, modulus_covariance=None)
         misfit, covariance = fitter.misfit(chosen), self.covariance_
         rows = len(problem.fitted)
         self.result_ = LearnerResult(
@@ -187,21 +180,3 @@ class TensorSINDy(RunPrediction):
     def _check_parameters(self) -> None:
         check_optimiser(self.optimizer)
         check_library(self.library)
-
-
-def _law(
-    library: TermLibrary,
-    support: tuple[int, ...],
-    coefficients: Float[np.ndarray, " n"],
-    inner: Float[np.ndarray, " m"],
-    known: KnownPart,
-) -> LibraryExpansion:
-    smaller = library.subset(support or [0])
-    used = [inner[i] for i, form in enumerate(library.forms) if form in smaller.forms]
-    return LibraryExpansion(
-        coefficients=on_device(coefficients[list(support or [0])]),
-        inner=on_device(np.array(used, float)),
-        library=smaller,
-        linear_relaxation=known.linear_relaxation,
-        base=known.law,
-    )

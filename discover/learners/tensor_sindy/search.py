@@ -13,7 +13,8 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Key, Search
-from discover.learners.settings import ARITHMETIC, KnownPart
+from discover.laws import Fluid
+from discover.learners.settings import ARITHMETIC
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.progress import require_wanted
 from tensor_library.library import TermLibrary
@@ -26,15 +27,15 @@ _NEGLIGIBLE = 1e-6
 
 
 def library_problem(
-    runs: Sequence[Run], library: TermLibrary, known: KnownPart, use_normal_stresses: bool
+    runs: Sequence[Run], library: TermLibrary, known: Fluid, use_normal_stresses: bool
 ) -> Problem:
     """Return the problem of finding library terms beside a known part, in fluid and noise alone.
 
     Errors of the known moduli are nuisances; instrument effects are for a closed loop or `compare`.
     `use_normal_stresses`: whether measured N1 and N2 are fitted too. Raises InputError if normal
-    stresses would be fitted twice, or a covariance is none of the moduli.
+    stresses would be fitted twice.
     """
-    fluid, observed = known.fluid, list(runs)
+    observed = list(runs)
     if use_normal_stresses:
         own = [run.name for run in runs if run.quantity in ("N1", "N2")]
         if own:
@@ -43,12 +44,13 @@ def library_problem(
                 "more. Leave out one of the two."
             )
         observed += [run.observing(quantity) for run in runs for quantity in run.beside]
+    covariance = known.modulus_covariance
     declared = DeclaredModel(
-        fluid.law,
-        np.asarray(fluid.modulus),
-        np.asarray(fluid.relaxation_time),
-        float(fluid.solvent_viscosity),
-        modulus_covariance=_checked(known.modulus_covariance, len(fluid.modulus)),
+        known.law,
+        np.asarray(known.modulus),
+        np.asarray(known.relaxation_time),
+        float(known.solvent_viscosity),
+        modulus_covariance=None if covariance is None else np.asarray(covariance),
     )
     return Problem(
         declared,
@@ -56,19 +58,6 @@ def library_problem(
         observed,
         computed=True,
     )
-
-
-def _checked(covariance, modes: int):
-    if covariance is None:
-        return None
-    values = np.asarray(covariance, dtype=float)
-    usable = values.shape in ((modes,) * 2, (modes + 1,) * 2) and np.all(np.isfinite(values))
-    if not usable or not np.allclose(values, values.T):
-        raise InputError(
-            "modulus_covariance must be a symmetric matrix in Pa² with one row for each mode, and "
-            f"one for a solvent or none; got the shape {values.shape} for {modes} modes."
-        )
-    return values
 
 
 @dataclass(frozen=True)
