@@ -13,13 +13,7 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.effects import make_effect
-from discover.equations import (
-    AugmentedLaw,
-    Box,
-    Equation,
-    StatePart,
-    equation_to_json,
-)
+from discover.equations import AugmentedLaw, Box, Equation, StatePart, equation_to_json
 from discover.equations import Tested as Where
 from discover.equations.files import read_result_laws
 from discover.laws import LAWS, Fluid, make_law
