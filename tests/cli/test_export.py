@@ -283,17 +283,6 @@ def test_an_export_does_not_write_over_the_result_that_it_reads(results):
     assert invoke("export", results, "--out", results / "law.py", "--overwrite").exit_code == 0
 
 
-def test_an_export_replaces_no_link_even_where_it_is_asked_to(results, tmp_path):
-    target = tmp_path / "thesis.tex"
-    target.write_text("years")
-    (tmp_path / "law.tex").symlink_to(target)
-    done = invoke("export", results, "--out", tmp_path / "law.tex", "--overwrite")
-    assert done.exit_code == 2
-    assert "no plain file" in done.stderr
-    assert (tmp_path / "law.tex").is_symlink()
-    assert target.read_text() == "years"
-
-
 def test_the_nearest_classical_law_stands_in_the_result_and_is_exported_in_place_of_the_answer(
     tmp_path,
 ):

@@ -294,7 +294,9 @@ def test_a_folder_of_files_is_imported_as_all_of_them(tmp_path):
         rows = "\n".join(f"{t:g},{RATE:g},{x:g}" for t, x in zip(TIMES, STRESS, strict=True))
         (tmp_path / "mine" / name).write_text(f"time_s,shear_rate_1_s,stress_Pa\n{rows}\n")
     (tmp_path / "mine" / ".hidden.csv").write_text("")
-    with pytest.raises(InputError, match="discover data import"):  # which is what to do with it
+    with pytest.raises(
+        InputError, match=r"has no runs\.csv.*discover data import"
+    ):  # which is what to do with it
         load_dataset(tmp_path / "mine")
     out, _ = run(tmp_path, tmp_path / "mine")
     assert set(load_dataset(out).names) == {"slow.csv", "fast.csv"}

@@ -1,7 +1,6 @@
 """Folders of more than anybody measures are checked in a time that one waits."""
 
 import numpy as np
-import pytest
 
 from discover.dataset import check_folder
 from discover.dataset.checking.runs import doubts_among_runs
@@ -44,14 +43,3 @@ def test_each_run_is_looked_at_once_however_many_there_are(monkeypatch):
     ]
     assert list(doubts_among_runs(runs)) == []
     assert looks == len(runs)
-
-
-@pytest.mark.parametrize("factor", [1e3, 1e-3])
-def test_one_run_of_many_in_another_unit_is_still_found(factor):
-    time = np.linspace(0.1, 5.0, 12)
-    rise, gains = 100 * -np.expm1(-time), np.where(np.arange(8) == 3, factor, 1.0)
-    runs = [
-        Run(f"r{i}.csv", time, start_up(rate), np.full(12, rate), rise * rate * gains[i])
-        for i, rate in enumerate(np.geomspace(0.1, 1.0, 8).tolist())
-    ]
-    assert {finding.file for finding in doubts_among_runs(runs)} == {"r3.csv"}

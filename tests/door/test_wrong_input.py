@@ -56,6 +56,11 @@ class WithUnit:
         (lambda: run(rate=0.5), "rate of the run 'a' must be a list or an array of numbers"),
         (lambda: run(time=TIMES[:, None]), "an array of shape"),
         (lambda: run(time=[], rate=[], stress=[]), "has no samples"),
+        (lambda: run(time=TIMES[::-1]), "increase strictly"),
+        (lambda: run(time=TIMES - 1.0), "at or after 0"),
+        (lambda: run(rate=RATES[:2]), r"must have shape \(31,\) like its time; got \(2,\)"),
+        (lambda: run(clock_factor=0.0), "clock factor"),
+        (lambda: dc.Dataset("melt", (run(), run())), "holds the run 'a' twice"),
         (lambda: run(protocol=0.5), r"must be a flow, such as start_up\(0\.5\)"),
         (lambda: run(name=None), "must be text"),
         (lambda: run(clock_factor="2"), "clock_factor of the run 'a' must be a number"),
@@ -187,6 +192,8 @@ def test_no_text_truth_value_or_complex_number_is_taken_for_a_number(value, flow
         lambda: dc.after_alternation(flow, value, np.array([0.0, 1.0])),
         lambda: dc.synthetic_dataset("ucm", noise=value),
         lambda: dc.synthetic_dataset("ucm", duration=value),
+        lambda: dc.synthetic_dataset("ucm", seed=value),
+        lambda: dc.synthetic_dataset("ucm", n_samples=value),
         lambda: dc.Fluid(UCM, value, 1.0),
         lambda: dc.Fluid(UCM, 1.0, value),
         lambda: dc.Fluid(UCM, 1.0, 1.0, value),
@@ -210,6 +217,8 @@ def test_numbers_of_any_plain_kind_are_taken():
         assert float(fluid.modulus[0]) == 2.0
         assert float(fluid.solvent_viscosity) == 3.0
     dc.after_alternation(dc.measured_rate([0, 1, 2, 3], [0, 1, 0, -1]), 4, [0, 1, 2, 3])
+    made = dc.synthetic_dataset("ucm", noise=np.float64(0.01), n_samples=np.int64(20), duration=2)
+    assert (made.noise, len(made[0])) == (0.01, 20)
 
 
 @pytest.mark.parametrize(

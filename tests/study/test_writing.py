@@ -140,13 +140,6 @@ class _FullDisk:
         return False
 
 
-def test_a_folder_in_the_place_of_a_result_is_the_users_to_remove(tmp_path):
-    (tmp_path / "part.json").mkdir()
-    with pytest.raises(InputError, match=r"part\.json is no plain file"):
-        write_text(tmp_path / "part.json", "x")
-    assert [path.name for path in tmp_path.iterdir()] == ["part.json"]
-
-
 # the module alone: the package would import much before the first write
 WRITER = """
 import importlib.util, sys
