@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.mode_search import ModeFit, ModeSearch, relative_moduli
+from discover.dataset.mode_search import CLOSELY, ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.noise_model import independent_samples, rms
@@ -168,8 +168,8 @@ def relaxation_spectrum(
     most = [fit for fit in fits if fit.n_modes + held <= (modes or MOST_MODES)]
     most = most or [min(fits, key=lambda fit: fit.n_modes)]
     possible = [fit for fit in most if fit.n_modes + held == modes] or most
-    likeliest = min(possible, key=lambda fit: fit.criterion)
-    found = _as_spectrum(sweep, search, search.closely(likeliest))
+    likeliest = min(possible, key=search.criterion)
+    found = _as_spectrum(sweep, search, search.fitted(likeliest, CLOSELY))
     best = _as_spectrum(sweep, search, min(fits, key=lambda fit: fit.squared))
     errors: dict[int, float] = {}
     for fit in fits:
@@ -186,13 +186,12 @@ def relaxation_spectrum(
 
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
     """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
-    fitted = fit.solvent_viscosity, fit.elastic_modulus
-    known = search.solvent_viscosity, search.elastic_modulus
+    times, known = fit.relaxation_time, (search.solvent_viscosity, search.elastic_modulus)
+    modulus, extra = fit.amounts[: len(times)], iter(fit.amounts[len(times) :])
     solvent, elastic = (
-        float(value) if one is None and isinstance(value, Real) else one or 0.0
-        for one, value in zip(fitted, known, strict=True)
+        float(next(extra)) if one else float(value) if isinstance(value, Real) else 0.0
+        for one, value in zip(fit.kinds, known, strict=True)
     )
-    modulus, times = fit.modulus, fit.relaxation_time
     if elastic > 0.0:
         modulus = np.append(modulus, elastic)
         times = np.append(times, search.elastic_time(fit))
