@@ -11,7 +11,6 @@ from time import perf_counter
 from discover.batch.status import (
     STATES,
     SUMMARY_FILES,
-    BatchProgress,
     BatchResult,
     StudyStatus,
     Summary,
@@ -158,24 +157,18 @@ def run_batch(
         for name, task in _tasks_of(path, name)
     ]
     _require_different([job[1] for job in jobs])
-    summary = Summary(out, [(job[1], job[2]) for job in jobs])
-    so_far = BatchProgress([job[1] for job in jobs], progress)
-
-    def end(position: int, status: StudyStatus) -> None:
-        summary.add(position, status)
-        so_far.end(position, status)
-
+    summary = Summary(out, [(job[1], job[2]) for job in jobs], progress)
     try:
         with on_stop(summary.write):
             if workers == 1 and scheduler is None:
                 for i, job in enumerate(jobs):
-                    end(i, run_one(*job, progress=partial(so_far.say, i)))
+                    summary.end(i, run_one(*job, progress=partial(summary.say, i)))
             else:
                 summary.write()  # once it was written, it takes no time on Ctrl-C
                 if scheduler is None:
-                    run_in_workers(jobs, min(workers, len(jobs)), so_far.say, end)
+                    run_in_workers(jobs, min(workers, len(jobs)), summary.say, summary.end)
                 else:
-                    run_on_cluster(run_one, jobs, scheduler, so_far.say, end)
+                    run_on_cluster(run_one, jobs, scheduler, summary.say, summary.end)
     finally:
         result = summary.write()  # what had ended before Ctrl-C is on the page too
     return result

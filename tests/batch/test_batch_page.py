@@ -60,7 +60,7 @@ def test_a_batch_shows_itself_in_a_notebook(tmp_path):
 
 def test_the_page_is_there_while_the_next_study_still_runs(tmp_path):
     summary = Summary(tmp_path, [("a", "compare"), ("b", "compare")])
-    summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
+    summary.end(0, StudyStatus("a", "compare", "failed", "the reason", True))
     page = (tmp_path / "index.html").read_text("utf-8")
     assert "the reason" in page
     assert "1 not run yet" in page
@@ -69,7 +69,7 @@ def test_the_page_is_there_while_the_next_study_still_runs(tmp_path):
 
 def test_a_page_that_cannot_be_written_is_told_at_the_end_and_not_by_a_traceback(tmp_path, capfd):
     summary = Summary(tmp_path / "gone", [("a", "compare")])
-    summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
+    summary.end(0, StudyStatus("a", "compare", "failed", "the reason", True))
     assert capfd.readouterr().err == ""
     with pytest.raises(FileNotFoundError):
         summary.write()

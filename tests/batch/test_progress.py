@@ -5,11 +5,11 @@ import errno
 import pytest
 
 from discover.batch import run
-from discover.batch.status import BatchProgress, StudyStatus, now_and_then
+from discover.batch.status import StudyStatus, Summary, now_and_then
 
 
-def ended(status):
-    return StudyStatus("x", "compare", status, "")
+def ended(status, name="x"):
+    return StudyStatus(name, "compare", status, "")
 
 
 @pytest.fixture
@@ -17,13 +17,22 @@ def said():
     return []
 
 
-def test_studies_side_by_side_add_up(said):
-    progress = BatchProgress(["a", "b"], lambda *line: said.append(line))
+@pytest.fixture
+def followed(tmp_path, said):
+    def of(*names):
+        jobs = [(name, "compare") for name in names]
+        return Summary(tmp_path, jobs, lambda *line: said.append(line))
+
+    return of
+
+
+def test_studies_side_by_side_add_up(said, followed):
+    progress = followed("a", "b")
     progress.say(0, "fitting", 0.5)
     progress.say(1, "loading", 0.25)
-    progress.end(0, ended("done"))
+    progress.end(0, ended("done", "a"))
     progress.say(0, "news that came late", 0.75)
-    progress.end(1, ended("failed"))
+    progress.end(1, ended("failed", "b"))
     assert said == [
         ("0 of 2 ended; a: fitting", 0.25),
         ("0 of 2 ended; b: loading", 0.375),
@@ -32,8 +41,8 @@ def test_studies_side_by_side_add_up(said):
     ]
 
 
-def test_results_that_were_there_do_not_make_the_rest_look_short(said):
-    progress = BatchProgress(list("abcd"), lambda *line: said.append(line))
+def test_results_that_were_there_do_not_make_the_rest_look_short(said, followed):
+    progress = followed(*"abcd")
     for i in range(3):
         progress.end(i, ended("complete"))
     progress.say(3, "fitting", 0.1)
