@@ -97,7 +97,6 @@ class RelaxationSpectrum:
     relaxation_time: Float[np.ndarray, " k"]  # λ_k in s, increasing
     relative_error: float  # root mean square of the relative misfit over all G′ and G″
     best_error: float  # the smallest of any number of modes tried
-    errors: dict[int, float]  # the smallest by number of modes
     # of the moduli in Pa², with a solvent's row and column last, in Pa s; None without a sweep
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
     solvent_viscosity: float = 0.0  # η_s in Pa s
@@ -171,17 +170,8 @@ def relaxation_spectrum(
     likeliest = min(possible, key=search.criterion)
     found = _as_spectrum(sweep, search, search.fitted(likeliest, CLOSELY))
     best = _as_spectrum(sweep, search, min(fits, key=lambda fit: fit.squared))
-    errors: dict[int, float] = {}
-    for fit in fits:
-        error = float(np.sqrt(fit.squared / measured.size))
-        errors[fit.n_modes + held] = min(error, errors.get(fit.n_modes + held, np.inf))
-    rows = _misfit(sweep, found)
-    return replace(
-        found,
-        best_error=best.relative_error,
-        errors=dict(sorted(errors.items())),
-        modulus_covariance=_covariance(sweep, found, rows),
-    )
+    covariance = _covariance(sweep, found, _misfit(sweep, found))
+    return replace(found, best_error=best.relative_error, modulus_covariance=covariance)
 
 
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
@@ -199,7 +189,7 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
     solid = ""
     if elastic > sweep.loss_modulus[slowest]:
         solid = _SOLID.format(sweep.angular_frequency[slowest], elastic, times[-1])
-    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, solvent, elastic, solid)
+    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, None, solvent, elastic, solid)
     return replace(found, relative_error=rms(_misfit(sweep, found)))
 
 

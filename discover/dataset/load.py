@@ -15,7 +15,7 @@ from jaxtyping import Float
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
-from discover.dataset.read_run import INDEX_FILE, read_run, reason_to_set_aside, table_of_run
+from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
 from discover.dataset.records.repeats import in_sequence
 from discover.dataset.run import Run
 from discover.dataset.tables import units
@@ -150,21 +150,18 @@ def load_dataset(
     used: list[int] = []
     runs: list[Run] = []
     for row, file in enumerate(names):
+        steady = None if before is None else float(before[row])
         with problems.collected():
-            reason = reason_to_set_aside(index, row, before is not None)
-            if reason is not None:
-                aside[file] = reason
-                continue
-        used.append(row)
+            try:
+                table, factor = table_of_run(root, file), float(factors[row])
+                runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
+                used.append(row)
+            except SetAside as why:
+                aside[file] = str(why)
     if aside and not used and not problems:
         raise InputError(
             f"No run of {name!r} can be fitted: {names[0]} is set aside, since {aside[names[0]]}."
         )
-    for row in used:
-        steady = None if before is None else float(before[row])
-        with problems.collected():
-            table, factor = table_of_run(root, names[row]), float(factors[row])
-            runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
     problems.require_none(name)
     if sequence is not None and runs:
         runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]

@@ -46,6 +46,8 @@ def test_a_steady_start_without_its_rate_is_not_read_as_a_start_from_rest(tmp_pa
     data = load_dataset(made)
     assert data.names == ("a.csv",)
     assert "rate_before" in data.left_out
+    (said,) = (f.text for f in check_folder(made) if f.file == "b.csv" and f.subject == "runs")
+    assert "b.csv is set aside: it starts from a steady flow" in said
     with pytest.raises(InputError, match="rate_before"):
         data.select(["b.csv"])
     # where the study says from which rate, it is used
