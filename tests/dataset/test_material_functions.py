@@ -27,22 +27,16 @@ def study(folder, **data):
     return parse_study({"data": {"folder": str(folder), **data}})
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_a_folder_of_one_table_is_a_data_set_which_is_fitted(tmp_path, name):
-    folder = write_files(tmp_path, {name: TABLES[name]})
+@pytest.mark.parametrize("name", [*TABLES, *SWEEPS])
+def test_a_folder_of_one_table_is_a_data_set_which_is_fitted_of_a_sweep_both_moduli(tmp_path, name):
+    folder = write_files(tmp_path, {name: (TABLES | SWEEPS)[name]})
+    moduli = (f"{name} (storage_modulus)", f"{name} (loss_modulus)")
     assert len(load_dataset(folder)) == 0
     data = load_study_data(study(folder))
-    assert data.fit.names == (name,)
+    assert data.fit.names == ((name,) if name in TABLES else moduli)
     assert not len(data.held_out)
     # from Python too
-    assert data_in_memory(load_dataset(folder)).fit.names == (name,)
-
-
-@pytest.mark.parametrize("name", SWEEPS)
-def test_a_folder_of_one_sweep_is_a_data_set_of_two_moduli_which_are_fitted(tmp_path, name):
-    data = load_study_data(study(write_files(tmp_path, {name: SWEEPS[name]})))
-    assert data.fit.names == (f"{name} (storage_modulus)", f"{name} (loss_modulus)")
-    assert load_dataset(tmp_path).with_material_functions().names == data.fit.names
+    assert data_in_memory(load_dataset(folder)).fit.names == data.fit.names
 
 
 def test_an_amplitude_sweep_is_sorted_by_strain_and_converted(tmp_path):

@@ -87,31 +87,28 @@ def titled(**metadata):
     return Run("r", pair, start_up(1.0), np.ones(2), np.ones(2), metadata=metadata)
 
 
+WARM = {"temperature_C": 20.0}
+
+
 @pytest.mark.parametrize(
-    ("rows", "words"),
+    ("rows", "otherwise", "words"),
     [
-        ([{}], ""),
-        ([{"temperature_C": 160.0}, {"temperature_C": 160.0}], "160 °C"),
-        ([{"sample": "LDPE", "temperature_C": 160.0}], "LDPE, 160 °C"),
-        (
-            [{"temperature_C_measured": -10.005}, {"temperature_C_measured": -23.01}],
-            "−23 and −10 °C",
-        ),
-        ([{"temperature_C": t} for t in (20.0, 40.0, 60.0)], "20 to 60 °C"),
-        ([{"material": "gel"}, {"material": "gel"}, {"material": "melt"}], "gel, melt"),
+        ([{}], "", ""),
+        ([WARM, WARM], "", "20 °C"),
+        ([{"sample": "LDPE", **WARM}], "", "LDPE, 20 °C"),
+        ([{"temperature_C_measured": t} for t in (-10.005, -23.01)], "", "−23 and −10 °C"),
+        ([{"temperature_C": t} for t in (20.0, 40.0, 60.0)], "", "20 to 60 °C"),
+        ([{"material": name} for name in ("gel", "gel", "melt")], "", "gel, melt"),
+        ([WARM], "melt-7", "melt-7, 20 °C"),
+        ([{"sample": "LDPE"}, WARM], "melt-7", "LDPE, 20 °C"),
+        ([*({"sample": name} for name in ("a1", "a2", "a3")), WARM], "melt-7", "melt-7, 20 °C"),
     ],
 )
-def test_titles_name_what_the_table_names_and_nothing_else(rows, words):
-    assert material_and_temperature([titled(**row) for row in rows]) == words
-
-
-@pytest.mark.parametrize(
-    ("samples", "words"),
-    [((), "melt-7, 20 °C"), (("LDPE",), "LDPE, 20 °C"), (("a1", "a2", "a3"), "melt-7, 20 °C")],
-)
-def test_the_name_of_the_data_stands_for_materials_that_nobody_told(samples, words):
-    runs = [titled(sample=one) for one in samples] + [titled(temperature_C=20.0)]
-    assert material_and_temperature(runs, otherwise="melt-7") == words
+def test_titles_name_what_the_table_names_or_the_data_where_it_names_none_or_many(
+    rows, otherwise, words
+):
+    runs = [titled(**row) for row in rows]
+    assert material_and_temperature(runs, otherwise=otherwise) == words
 
 
 def test_a_window_cuts_samples_and_keeps_the_flow():

@@ -77,12 +77,13 @@ class WithUnit:
         (lambda: dc.synthetic_dataset("ucm", n_samples=2.5), "whole number"),
         (lambda: dc.Fluid("ucm", 1.0, 1.0), "make_law"),
         (lambda: dc.Fluid(UCM, -1.0, 1.0), "modulus of a fluid must be positive"),
+        (lambda: dc.Fluid(UCM, 0.0, 1.0), "modulus of a fluid must be positive"),
+        (lambda: dc.Fluid(UCM, 1.0, -1.0), "relaxation_time of a fluid must be positive"),
         (lambda: dc.Fluid(UCM, 1.0, np.nan), "relaxation_time of a fluid must be positive"),
         (lambda: dc.Fluid(UCM, [1.0, 2.0], [1.0]), "one value for each mode"),
         (lambda: dc.Fluid(UCM, "much", 1.0), "must be numbers"),
         (lambda: dc.Fluid.from_sweep(DATA), "data.linear_sweep; got a Dataset"),
         (lambda: dc.start_up("fast"), "must be finite numbers"),
-        (lambda: dc.in_flow(0.3, "uniaxial"), "takes a flow"),
         (lambda: dc.build_library(degree="two"), "degree must be 0 to 4"),
         (lambda: dc.compare(DATA, held_out=3), "held_out must be a data set"),
         (lambda: dc.compare(DATA, progress="loud"), "progress must be a function"),
@@ -163,6 +164,8 @@ def test_a_table_is_the_data_set_that_its_files_would_be(tmp_path):
         ((DATA.to_dataframe(), pd.DataFrame({"run": ["b"]})), "of which there is no sample"),
         ((DATA.to_dataframe(), pd.DataFrame({"flow": ["shear"]})), "no column 'file'"),
         ((None, None, {"sweep": DATA.to_dataframe()}), "Unknown table 'sweep'. Write one of"),
+        ((None, None, "lve"), "mapping"),
+        ((None, None, [1]), "mapping"),
     ],
 )
 def test_a_table_that_is_no_data_set_is_refused(arguments, message):
@@ -201,13 +204,6 @@ def test_no_text_truth_value_or_complex_number_is_taken_for_a_number(value, flow
     ):
         with pytest.raises(dc.InputError):
             make()
-
-
-@pytest.mark.parametrize("value", [-1.0, 0.0])
-def test_a_modulus_and_a_time_are_positive(value):
-    for numbers in ((value, 1.0), (1.0, value)):
-        with pytest.raises(dc.InputError):
-            dc.Fluid(UCM, *numbers)
 
 
 def test_numbers_of_any_plain_kind_are_taken():
@@ -272,9 +268,3 @@ def test_other_names_are_kept(name):
 def test_a_table_that_is_none_of_samples_is_refused(table):
     with pytest.raises(dc.InputError):
         dc.from_dataframe(table)
-
-
-@pytest.mark.parametrize("tables", ["lve", 3, [1]], ids=lambda value: type(value).__name__)
-def test_tables_are_a_mapping(tables):
-    with pytest.raises(dc.InputError, match="mapping"):
-        dc.from_dataframe(samples("a"), tables=tables)
