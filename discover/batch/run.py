@@ -20,7 +20,7 @@ from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError, plain_os_error
 from discover.first_use import enable_x64
 from discover.progress import FollowedBy, Progress, on_stop
-from discover.study.atomic import make_folder, require_ours
+from discover.study.atomic import make_folder, require_free
 from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study, Verdict
@@ -138,7 +138,7 @@ def run_batch(
     """
     make_folder(out)
     if not overwrite:
-        require_ours(out, SUMMARY_FILES, STATES)
+        require_free(out, SUMMARY_FILES, STATES)
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)
