@@ -178,10 +178,8 @@ def start_up(rate: float) -> FlowProtocol:
 def step_rates(times: Sequence[float], rates: Sequence[float]) -> FlowProtocol:
     """Return a shear rate that jumps to ``rates[i]`` at ``times[i]``.
 
-    Parameters
-    ----------
-    times, rates
-        In s, increasing, and in 1/s, as many; the first rate also holds before ``times[0]``.
+    `times`, `rates`: in s, increasing, and in 1/s, as many, shape (n,); the first rate also holds
+    before ``times[0]``.
     """
     t, r = _pair("step_rates", times, rates)
     # each jump is a pair of entries at one time
@@ -195,12 +193,8 @@ def measured_rate(
 ) -> FlowProtocol:
     """Return the piecewise-linear shear rate through measured points.
 
-    Of few samples a cycle straight lines cut the crests: `sampled_rate` does not.
-
-    Parameters
-    ----------
-    times, rates
-        In s, strictly increasing, and in 1/s, as many.
+    `times`, `rates`: in s, strictly increasing, and in 1/s, as many, shape (n,). Of few samples a
+    cycle straight lines cut the crests: `sampled_rate` does not.
 
     Examples
     --------

@@ -39,12 +39,7 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
     """Return what is wrong, doubtful or worth knowing about a data folder; errors come first.
 
     Nothing is simulated: a run is compared with itself, with what a passive fluid at rest can do,
-    and with linear viscoelasticity.
-
-    Parameters
-    ----------
-    folder, clock_factor
-        As in `discover.dataset.load.load_dataset`.
+    and with linear viscoelasticity. `folder`, `clock_factor`: as in `load_dataset`.
 
     Examples
     --------
