@@ -174,6 +174,18 @@ OTHERS = {
         ("file\na.csv\na.csv\n", "names a.csv twice"),
         ("file,factor\nmissing.csv,2\n", "no file missing.csv"),
     ],
+    "flow_curve.csv": [
+        ("shear_rate_1_s,stress_Pa\n0,1\n1,2\n", "must be positive; line 2 holds 0"),
+        ("shear_rate_1_s\n1\n", "no column stress_Pa"),
+    ],
+    "creep.csv": [
+        ("time_s,compliance_1_Pa\n1,1\n1,2\n3,4\n", "increase strictly"),
+        ("time_s,compliance_1_Pa\n1,1\n2,-2\n3,4\n", "must be positive; line 3"),
+    ],
+    "relaxation.csv": [
+        ("time_s,relaxation_modulus_Pa\n", "relaxation.csv has a header but no rows")
+    ],
+    "amplitude_sweep.csv": [("strain,omega_rad_s,Gp_Pa,Gpp_Pa\n0,1,1,1\n", "must be positive")],
     "lve.csv": [
         ("omega_rad_s,Gp_Pa,Gpp_Pa\n1,-5,5\n", "Gp_Pa in lve.csv must be positive"),
         ("omega_rad_s,Gp_Pa\n1,5\n", "no column Gpp_Pa"),

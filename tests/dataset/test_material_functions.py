@@ -141,26 +141,6 @@ def test_what_the_data_do_not_hold_is_said(tmp_path, keys, message):
         load_study_data(study(folder, **keys))
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "message"),
-    [
-        (
-            "flow_curve.csv",
-            "shear_rate_1_s,stress_Pa\n0,1\n1,2\n",
-            "shear_rate_1_s .* line 2 holds 0",
-        ),
-        ("flow_curve.csv", "shear_rate_1_s\n1\n", "no column .*stress"),
-        ("creep.csv", "time_s,compliance_1_Pa\n1,1\n1,2\n3,4\n", "increase strictly"),
-        ("creep.csv", "time_s,compliance_1_Pa\n1,1\n2,-2\n3,4\n", "must be positive; line 3"),
-        ("relaxation.csv", "time_s,relaxation_modulus_Pa\n", "relaxation.csv"),
-        ("amplitude_sweep.csv", "strain,omega_rad_s,Gp_Pa,Gpp_Pa\n0,1,1,1\n", "strain .* positive"),
-    ],
-)
-def test_a_wrong_table_is_refused_with_file_and_line(tmp_path, name, text, message):
-    with pytest.raises(InputError, match=message):
-        load_dataset(write_files(tmp_path, {name: text}))
-
-
 def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
     files = {
         "runs.csv": "file,control\ncreep.csv,stress\n",

@@ -38,25 +38,11 @@ def test_a_value_of_another_kind_is_refused_with_its_name(section, values):
         study(section, **values)
 
 
-def test_noise_of_synthetic_data_is_no_truth_value():
-    with pytest.raises(InputError, match="noise: should be a number; got true"):
-        parse_study({"data": {"synthetic": {"law": "giesekus", "noise": True}}})
-
-
 def test_whole_numbers_are_numbers_and_truth_values_are_truth_values():
     model = study("model", law="giesekus", modulus_Pa=3, parameters={"alpha": 0}).model
     assert (model.modulus_Pa, model.parameters["alpha"]) == (3.0, 0.0)
     assert study("compare", quick=True).compare.quick is True
     assert study("loop", strain=[0, 25]).loop.strain == (0.0, 25.0)
-
-
-@pytest.mark.parametrize(
-    ("section", "key", "remedy"),
-    [("data", "fit", "leave it out to fit all"), ("loop", "effects", "max_effects = 0")],
-)
-def test_an_empty_list_is_not_all_of_them(section, key, remedy):
-    with pytest.raises(InputError, match=remedy):
-        study(section, **{key: []})
 
 
 def test_no_run_held_out_may_be_written():

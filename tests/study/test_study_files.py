@@ -54,6 +54,17 @@ test = "paper"
     assert study.name == "s"
 
 
+MODES_THAT_CANNOT_BE = (
+    ({"modulus_Pa": [1, 2], "relaxation_time_s": [1.0]}, "as many values"),
+    ({"modulus_Pa": [1, 2]}, "as many values"),
+    ({"modes": "lve", "modulus_Pa": [1], "relaxation_time_s": [1]}, "leave one of them out"),
+    *(({"modes": wrong}, "modes") for wrong in (0, True, 2.5, 40)),
+    ({"elastic_modulus_Pa": "fit"}, "modes"),
+    ({"solvent_viscosity_Pa_s": -1}, "solvent_viscosity_Pa_s"),
+    ({"modulus_Pa": [], "relaxation_time_s": []}, "modulus_Pa"),
+)
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -73,6 +84,10 @@ test = "paper"
         ({"data": SYNTHETIC, "model": {"sweep_rad_s": [1, 2]}}, ["sweep_rad_s", "lve"]),
         ({"data": SYNTHETIC, "model": {"modes": "lve", "sweep_rad_s": [2, 1]}}, ["[low, high]"]),
         ({"data": {"synthetic": {"law": "ucm", "noise": float("nan")}}}, ["noise"]),
+        ({"data": {"synthetic": {"law": "ucm", "noise": True}}}, ["should be a number; got true"]),
+        ({"data": {"folder": "a", "fit": []}}, ["leave it out to fit all"]),
+        ({"data": SYNTHETIC, "loop": {"effects": []}}, ["max_effects = 0"]),
+        *(({"data": SYNTHETIC, "model": model}, [word]) for model, word in MODES_THAT_CANNOT_BE),
     ],
 )
 def test_a_wrong_study_is_one_error_that_names_the_key(content, words):
