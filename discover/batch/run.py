@@ -1,7 +1,7 @@
 """Many studies, one after the other, side by side, or on a dask cluster."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import as_file, files
@@ -11,7 +11,6 @@ from time import perf_counter
 from discover.batch.status import (
     STATES,
     SUMMARY_FILES,
-    BatchProgress,
     BatchResult,
     StudyStatus,
     Summary,
@@ -21,7 +20,7 @@ from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError, plain_os_error
 from discover.first_use import enable_x64
 from discover.progress import FollowedBy, Progress, on_stop
-from discover.study.atomic import make_folder, require_ours
+from discover.study.atomic import make_folder, require_free
 from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study, Verdict
@@ -45,47 +44,6 @@ class TaskResult:
     json_file: Path
     text: str  # the verdict, for a terminal
     was_complete: bool  # whether everything was there already
-
-
-Work = Callable[[Study, int | None, RunFolder, Progress], Sequence[str]]
-"""Fills a folder with the results of a study; returns the verdict in lines."""
-
-
-class _Task:
-    """Work on a study as a command does it, in a folder that is resumed and closed."""
-
-    def __init__(self, name: str, work: Work):
-        self.name, self.work = name, work
-        self.__doc__ = work.__doc__
-
-    def __call__(
-        self, path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress,
-        tolerance: float | None = None,
-    ) -> TaskResult:  # fmt: skip
-        """Run the task; InputError if the study, its data or the folder is wrong.
-
-        `out`: folder for the results; goes on there if it holds unfinished ones. `seed`,
-        `tolerance`: in place of the study's. `overwrite`: start afresh. `progress`: called with
-        what is going on and the fraction done.
-        """
-        enable_x64()
-        enable_compilation_cache()
-        study = read_study(path)
-        if tolerance is not None:
-            verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
-            study = study.model_copy(update={"verdict": verdict})
-        folder = RunFolder(out, fingerprint(study, self.name, seed), overwrite)
-        there = folder.complete and folder.holds(_PAGE, _JSON_FILES[self.name])
-        if there:
-            text = (folder.load("verdict") or {}).get("text", "")
-        else:
-            text = "\n".join(
-                self.work(study, seed, folder, FollowedBy(progress, _DRAWING[self.name]))
-            )
-            folder.save("verdict", {"text": text})
-            folder.finish()
-            progress("done", 1.0)
-        return TaskResult(folder.path / _PAGE, folder.path / _JSON_FILES[self.name], text, there)
 
 
 def _compare(study: Study, seed: int | None, folder: RunFolder, part: Progress) -> Sequence[str]:
@@ -117,8 +75,37 @@ def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progres
     return result.answer.lines
 
 
-run_compare, run_close_loop = _Task("compare", _compare), _Task("close-loop", _close_loop)
-_TASKS = {task.name: task for task in (run_compare, run_close_loop)}
+def _run(
+    task: str, path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress,
+    tolerance: float | None = None,
+) -> TaskResult:  # fmt: skip
+    """Run a task on a study; InputError if the study, its data or the folder is wrong.
+
+    `out`: folder for the results; goes on there if it holds unfinished ones. `seed`, `tolerance`:
+    in place of the study's. `overwrite`: start afresh. `progress`: called with what is going on and
+    the fraction done.
+    """
+    enable_x64()
+    enable_compilation_cache()
+    study = read_study(path)
+    if tolerance is not None:
+        verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
+        study = study.model_copy(update={"verdict": verdict})
+    folder = RunFolder(out, fingerprint(study, task, seed), overwrite)
+    there = folder.complete and folder.holds(_PAGE, _JSON_FILES[task])
+    if there:
+        text = (folder.load("verdict") or {}).get("text", "")
+    else:
+        work = _compare if task == "compare" else _close_loop
+        text = "\n".join(work(study, seed, folder, FollowedBy(progress, _DRAWING[task])))
+        folder.save("verdict", {"text": text})
+        folder.finish()
+        progress("done", 1.0)
+    return TaskResult(folder.path / _PAGE, folder.path / _JSON_FILES[task], text, there)
+
+
+run_compare, run_close_loop = partial(_run, "compare"), partial(_run, "close-loop")
+_TASKS = {"compare": run_compare, "close-loop": run_close_loop}
 
 
 def run_demo(
@@ -151,31 +138,25 @@ def run_batch(
     """
     make_folder(out)
     if not overwrite:
-        require_ours(out, SUMMARY_FILES, STATES)
+        require_free(out, SUMMARY_FILES, STATES)
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)
         for name, task in _tasks_of(path, name)
     ]
     _require_different([job[1] for job in jobs])
-    summary = Summary(out, [(job[1], job[2]) for job in jobs])
-    so_far = BatchProgress([job[1] for job in jobs], progress)
-
-    def end(position: int, status: StudyStatus) -> None:
-        summary.add(position, status)
-        so_far.end(position, status)
-
+    summary = Summary(out, [(job[1], job[2]) for job in jobs], progress)
     try:
         with on_stop(summary.write):
             if workers == 1 and scheduler is None:
                 for i, job in enumerate(jobs):
-                    end(i, run_one(*job, progress=partial(so_far.say, i)))
+                    summary.end(i, run_one(*job, progress=partial(summary.say, i)))
             else:
                 summary.write()  # once it was written, it takes no time on Ctrl-C
                 if scheduler is None:
-                    run_in_workers(jobs, min(workers, len(jobs)), so_far.say, end)
+                    run_in_workers(jobs, min(workers, len(jobs)), summary.say, summary.end)
                 else:
-                    run_on_cluster(run_one, jobs, scheduler, so_far.say, end)
+                    run_on_cluster(run_one, jobs, scheduler, summary.say, summary.end)
     finally:
         result = summary.write()  # what had ended before Ctrl-C is on the page too
     return result

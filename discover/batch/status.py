@@ -78,42 +78,6 @@ class BatchResult(NotebookView):
 _PAUSE = 1.0  # seconds between two lines of one study that a worker sends
 
 
-class BatchProgress:
-    """Adds up studies that run side by side or one after the other.
-
-    Studies whose result was there already do not count: finding it takes no time.
-    """
-
-    def __init__(self, names: list[str], progress: Progress):
-        self._names = names
-        self._progress = progress
-        self._fractions = [0.0] * len(names)
-        self._ended: dict[int, StudyStatus] = {}
-        self._lock = Lock()  # news from workers comes in a thread of its own
-
-    def say(self, position: int, label: str, fraction: float) -> None:
-        """Take note of how far a study is; news that a study has outrun is passed over."""
-        with self._lock:
-            if position in self._ended:
-                return
-            self._fractions[position] = max(self._fractions[position], fraction)
-            self._report(position, label)
-
-    def end(self, position: int, status: StudyStatus) -> None:
-        """Take note of a study that has ended."""
-        with self._lock:
-            self._ended[position] = status
-            self._fractions[position] = 1.0
-            self._report(position, status.status)
-
-    def _report(self, position: int, label: str) -> None:
-        there = [i for i, status in self._ended.items() if status.status == "complete"]
-        to_do = len(self._names) - len(there)
-        fraction = (sum(self._fractions) - len(there)) / to_do if to_do else 1.0
-        ended = f"{len(self._ended)} of {len(self._names)} ended"
-        self._progress(f"{ended}; {self._names[position]}: {label}", fraction)
-
-
 def now_and_then(send: Callable[[str, float], None], pause: float = _PAUSE) -> Progress:
     """Return a progress function that passes on at most one line in so many seconds."""
     latest = -pause
@@ -129,24 +93,48 @@ def now_and_then(send: Callable[[str, float], None], pause: float = _PAUSE) -> P
 
 PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
 """What lies in the folder of a batch beside the folders of its studies."""
-
 _PAGE_PAUSE = 5.0  # seconds in which the page is written once, however many studies end
 
 
 class Summary:
-    """Writes ``index.html``, ``table.csv`` and ``batch.json`` of jobs, given as name and task."""
+    """Follows the jobs of a batch, given as name and task, and says how far it is.
 
-    def __init__(self, out: Path, jobs: Sequence[tuple[str, str]]):
-        self.out = out
+    Writes ``index.html``, ``table.csv`` and ``batch.json``. Studies whose result was there already
+    do not count as time: finding it takes none.
+    """
+
+    def __init__(
+        self, out: Path, jobs: Sequence[tuple[str, str]],
+        progress: Progress = lambda label, fraction: None,
+    ):  # fmt: skip
+        self.out, self._progress = out, progress
         self._statuses = [StudyStatus(name, task, "waiting", "") for name, task in jobs]
+        self._fractions = [0.0] * len(jobs)
         self._last = -_PAGE_PAUSE
+        self._lock = Lock()  # news from workers comes in a thread of its own
 
-    def add(self, position: int, status: StudyStatus) -> None:
+    def say(self, position: int, label: str, fraction: float) -> None:
+        """Take note of how far a study is; news that a study has outrun is passed over."""
+        with self._lock:
+            if self._statuses[position].status == "waiting":
+                self._fractions[position] = max(self._fractions[position], fraction)
+                self._report(position, label)
+
+    def end(self, position: int, status: StudyStatus) -> None:
         """Take note of a study that has ended, on the page too unless that was just written."""
-        self._statuses[position] = status
+        with self._lock:
+            self._statuses[position], self._fractions[position] = status, 1.0
+            self._report(position, status.status)
         if monotonic() - self._last >= _PAGE_PAUSE:
             with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
                 self.write()
+
+    def _report(self, position: int, label: str) -> None:
+        both = zip(self._fractions, self._statuses, strict=True)
+        taken = [fraction for fraction, one in both if one.status != "complete"]
+        ended = sum(one.status != "waiting" for one in self._statuses)
+        said = f"{ended} of {len(self._statuses)} ended; {self._statuses[position].name}: {label}"
+        self._progress(said, sum(taken) / len(taken) if taken else 1.0)
 
     def write(self) -> BatchResult:
         """Write everything now and return how the studies ended."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from discover.errors import InputError, plain_os_error, problems_in
 from discover.inputs_kept import inputs_kept
@@ -253,32 +254,24 @@ def number(text: str, where: str) -> float:
     return float(text)
 
 
+Texts = list[str] | None
+"""An option that may be given several times."""
 StudyArgument = Annotated[
-    Path,
-    typer.Argument(help="Study file (TOML); discover data import writes one.", show_default=False),
+    Path, Argument(help="Study file (TOML); discover data import writes one.", show_default=False)
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
+    Path | None, Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]
 SeedOption = Annotated[
     int | None,
-    typer.Option(
-        "--seed", min=0, max=2**32 - 1, help="Seed of noise and learners, in place of the study's."
-    ),
+    Option(min=0, max=2**32 - 1, help="Seed of noise and learners, in place of the study's."),
 ]
-QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-OverwriteOption = Annotated[
-    bool, typer.Option("--overwrite", help="Start again instead of resuming.")
-]
+QuietOption = Annotated[bool, Option("--quiet", "-q", help="Print no progress and no summary.")]
+JsonOption = Annotated[bool, Option("--json", help="Print the result as JSON.")]
+OverwriteOption = Annotated[bool, Option("--overwrite", help="Start again instead of resuming.")]
 ToleranceOption = Annotated[
     float | None,
-    typer.Option(
-        "--tolerance",
-        min=0.0,
-        max=1.0,
-        help="Relative misfit that you accept; default: the study's, or 0.05.",
+    Option(
+        min=0.0, max=1.0, help="Relative misfit that you accept; default: the study's, or 0.05."
     ),
 ]

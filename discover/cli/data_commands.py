@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import Annotated, get_args
 
 import typer
+from typer import Argument, Option
 
-from discover.cli.console import JsonOption, OverwriteOption, guarded, say
+from discover.cli.console import JsonOption, OverwriteOption, Texts, guarded, say
 from discover.errors import InputError
 
 data_app = typer.Typer(help="Import, check and draw data.", no_args_is_help=True)
 
 FolderArgument = Annotated[
-    str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
+    str, Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
 ]
 
 
@@ -56,7 +57,7 @@ def show(
     name: FolderArgument,
     out: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--out", "-o", help="Folder for a page with all tests drawn, and a study to start from."
         ),
     ] = None,
@@ -111,10 +112,7 @@ def show(
 def check(
     folder: FolderArgument,
     clock_factor: Annotated[
-        str | None,
-        typer.Option(
-            "--clock-factor", help="Column of runs.csv with a clock factor, to check as well."
-        ),
+        str | None, Option(help="Column of runs.csv with a clock factor, to check as well.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -144,63 +142,49 @@ def check(
 def import_data(
     files: Annotated[
         list[Path] | None,
-        typer.Argument(help="Exported files, with one or more tests in each, or a folder of them."),
+        Argument(help="Exported files, with one or more tests in each, or a folder of them."),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
-    mapping: Annotated[
-        Path | None, typer.Option("--mapping", help="TOML file with the options below.")
-    ] = None,
-    column: Annotated[
-        list[str] | None, typer.Option("--column", help="Which column is what: stress='Stress'.")
-    ] = None,
-    unit: Annotated[
-        list[str] | None, typer.Option("--unit", help="Unit of a quantity: stress=kPa.")
-    ] = None,
+    out: Annotated[Path | None, Option("--out", "-o", help="Data folder to make.")] = None,
+    mapping: Annotated[Path | None, Option(help="TOML file with the options below.")] = None,
+    column: Annotated[Texts, Option(help="Which column is what: stress='Stress'.")] = None,
+    unit: Annotated[Texts, Option(help="Unit of a quantity: stress=kPa.")] = None,
     geometry: Annotated[
         str | None,
-        typer.Option(
-            "--geometry",
+        Option(
             help="For torque, angle and force: cone_plate:radius_mm=25,angle_deg=1 or "
-            "plate_plate:radius_mm=25,gap_mm=1.",
+            "plate_plate:radius_mm=25,gap_mm=1."
         ),
     ] = None,
     block: Annotated[
-        list[int] | None, typer.Option("--block", min=1, help="Import only these blocks of a file.")
+        list[int] | None, Option(min=1, help="Import only these blocks of a file.")
     ] = None,
     test: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--test",
+        Texts,
+        Option(
             help="Kind of test in a block, if it is misread: melt.txt:2=creep; "
-            "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none.",
+            "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none."
         ),
     ] = None,
     temperature: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--temperature",
+        Texts,
+        Option(
             help="Temperature to import, in °C, if there are several, or that of a file: "
-            "melt.txt=140.",
+            "melt.txt=140."
         ),
     ] = None,
     start_time: Annotated[
-        float | None,
-        typer.Option("--start-time", help="Clock reading when the flow started, in s."),
+        float | None, Option(help="Clock reading when the flow started, in s.")
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option("--format", help="Importer of your own; default: by suffix, else text."),
+        Option("--format", help="Importer of your own; default: by suffix, else text."),
     ] = None,
-    delimiter: Annotated[
-        str | None, typer.Option("--delimiter", help="tab, semicolon or comma.")
-    ] = None,
-    decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign, . or ,")] = None,
-    header_row: Annotated[
-        int | None, typer.Option("--header-row", min=1, help="Line with the column names.")
-    ] = None,
-    encoding: Annotated[str | None, typer.Option("--encoding", help="Such as cp1252.")] = None,
+    delimiter: Annotated[str | None, Option(help="tab, semicolon or comma.")] = None,
+    decimal: Annotated[str | None, Option(help="Decimal sign, . or ,")] = None,
+    header_row: Annotated[int | None, Option(min=1, help="Line with the column names.")] = None,
+    encoding: Annotated[str | None, Option(help="Such as cp1252.")] = None,
     page: Annotated[
-        bool, typer.Option(help="Write a page with every test drawn, and a study to start from.")
+        bool, Option(help="Write a page with every test drawn, and a study to start from.")
     ] = True,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,

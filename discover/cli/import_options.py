@@ -119,7 +119,8 @@ def write_folder(
                 f"{out / 'imported'}."
             )
     make_folder(out)
-    require_free(out, (*DATA_FILES, TESTS_FILE), overwrite)
+    if not overwrite:
+        require_free(out, (*DATA_FILES, TESTS_FILE))
     sources = tuple(
         source.model_copy(update={"file": Path(os.path.relpath(source.file, out)).as_posix()})
         for source in imported.mapping.source

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from discover.cli import console
 from discover.errors import InputError
@@ -13,25 +14,17 @@ from discover.errors import InputError
 
 @console.guarded
 def fit(
-    law: Annotated[str, typer.Argument(help="Name of the law; see: discover laws.")],
-    data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
-    held_out: Annotated[
-        list[str] | None, typer.Option("--held-out", help="Run that only tests the fit.")
-    ] = None,
-    bounds: Annotated[
-        list[str] | None, typer.Option("--bounds", help="Range of a constant: alpha=0:0.5.")
-    ] = None,
-    start: Annotated[
-        list[str] | None, typer.Option("--start", help="Start of a constant: alpha=0.2.")
-    ] = None,
+    law: Annotated[str, Argument(help="Name of the law; see: discover laws.")],
+    data: Annotated[Path, Argument(metavar="folder", help="Data folder.")],
+    held_out: Annotated[console.Texts, Option(help="Run that only tests the fit.")] = None,
+    bounds: Annotated[console.Texts, Option(help="Range of a constant: alpha=0:0.5.")] = None,
+    start: Annotated[console.Texts, Option(help="Start of a constant: alpha=0.2.")] = None,
     fixed: Annotated[
-        list[str] | None, typer.Option("--fix", help="Constant that is not fitted: alpha=0.2.")
+        console.Texts, Option("--fix", help="Constant that is not fitted: alpha=0.2.")
     ] = None,
-    solvent: Annotated[
-        bool, typer.Option("--solvent", help="Also fit a solvent viscosity.")
-    ] = False,
+    solvent: Annotated[bool, Option("--solvent", help="Also fit a solvent viscosity.")] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder for page, JSON and equation.")
+        Path | None, Option("--out", "-o", help="Folder for page, JSON and equation.")
     ] = None,
     quiet: console.QuietOption = False,
     as_json: console.JsonOption = False,
@@ -100,39 +93,29 @@ def _bounds(name: str, text: str) -> tuple[float, float]:
 def export(
     results: Annotated[
         Path,
-        typer.Argument(
-            help="Result folder of a finished compare or close-loop.", show_default=False
-        ),
+        Argument(help="Result folder of a finished compare or close-loop.", show_default=False),
     ],
     form: Annotated[
-        str,
-        typer.Option(
-            "--format",
-            "-f",
-            help="python, sympy, latex, json, rheotool or ufl.",
-        ),
+        str, Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")
     ] = "python",
     law: Annotated[
-        str | None,
-        typer.Option("--law", help="Learner whose law to write; default: the law of the answer."),
+        str | None, Option(help="Learner whose law to write; default: the law of the answer.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; default: standard output.")
+        Path | None, Option("--out", "-o", help="File to write; default: standard output.")
     ] = None,
     density: Annotated[
-        float | None,
-        typer.Option("--density", min=0.0, help="Density in kg/m3, for rheotool; default: 1000."),
+        float | None, Option(min=0.0, help="Density in kg/m3, for rheotool; default: 1000.")
     ] = None,
     tolerance: Annotated[
         float | None,
-        typer.Option(
-            "--tolerance",
+        Option(
             min=0.0,
             max=0.5,
             help="For rheotool: accepted deviation from a law it knows; default: 0.01.",
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
     from discover.answer.exported import simple_material_text

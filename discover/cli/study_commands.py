@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from discover.cli import console
 from discover.cli.console import progress_bar
@@ -52,17 +53,15 @@ close_loop = _command(
 
 @console.guarded
 def batch(
-    studies: Annotated[list[Path], typer.Argument(help="Study files.", show_default=False)],
+    studies: Annotated[list[Path], Argument(help="Study files.", show_default=False)],
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="Folder for the results; default: results/batch."),
+        Path | None, Option("--out", "-o", help="Folder for the results; default: results/batch.")
     ] = None,
     workers: Annotated[
-        int, typer.Option("--workers", min=1, max=1024, help="Number of processes on this machine.")
+        int, Option(min=1, max=1024, help="Number of processes on this machine.")
     ] = 1,
     scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", help="Address of a dask scheduler, tls://host:port."),
+        str | None, Option(help="Address of a dask scheduler, tls://host:port.")
     ] = None,
     seed: console.SeedOption = None,
     quiet: console.QuietOption = False,
@@ -87,7 +86,7 @@ def batch(
 
 @console.guarded
 def demo(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path(
+    out: Annotated[Path, Option("--out", "-o", help="Folder for the results.")] = Path(
         "discover-demo"
     ),
     seed: console.SeedOption = None,

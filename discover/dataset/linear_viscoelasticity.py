@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.mode_search import ModeFit, ModeSearch, relative_moduli
+from discover.dataset.mode_search import CLOSELY, ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.noise_model import independent_samples, rms
@@ -97,7 +97,6 @@ class RelaxationSpectrum:
     relaxation_time: Float[np.ndarray, " k"]  # λ_k in s, increasing
     relative_error: float  # root mean square of the relative misfit over all G′ and G″
     best_error: float  # the smallest of any number of modes tried
-    errors: dict[int, float]  # the smallest by number of modes
     # of the moduli in Pa², with a solvent's row and column last, in Pa s; None without a sweep
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
     solvent_viscosity: float = 0.0  # η_s in Pa s
@@ -168,31 +167,21 @@ def relaxation_spectrum(
     most = [fit for fit in fits if fit.n_modes + held <= (modes or MOST_MODES)]
     most = most or [min(fits, key=lambda fit: fit.n_modes)]
     possible = [fit for fit in most if fit.n_modes + held == modes] or most
-    likeliest = min(possible, key=lambda fit: fit.criterion)
-    found = _as_spectrum(sweep, search, search.closely(likeliest))
+    likeliest = min(possible, key=search.criterion)
+    found = _as_spectrum(sweep, search, search.fitted(likeliest, CLOSELY))
     best = _as_spectrum(sweep, search, min(fits, key=lambda fit: fit.squared))
-    errors: dict[int, float] = {}
-    for fit in fits:
-        error = float(np.sqrt(fit.squared / measured.size))
-        errors[fit.n_modes + held] = min(error, errors.get(fit.n_modes + held, np.inf))
-    rows = _misfit(sweep, found)
-    return replace(
-        found,
-        best_error=best.relative_error,
-        errors=dict(sorted(errors.items())),
-        modulus_covariance=_covariance(sweep, found, rows),
-    )
+    covariance = _covariance(sweep, found, _misfit(sweep, found))
+    return replace(found, best_error=best.relative_error, modulus_covariance=covariance)
 
 
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
     """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
-    fitted = fit.solvent_viscosity, fit.elastic_modulus
-    known = search.solvent_viscosity, search.elastic_modulus
+    times, known = fit.relaxation_time, (search.solvent_viscosity, search.elastic_modulus)
+    modulus, extra = fit.amounts[: len(times)], iter(fit.amounts[len(times) :])
     solvent, elastic = (
-        float(value) if one is None and isinstance(value, Real) else one or 0.0
-        for one, value in zip(fitted, known, strict=True)
+        float(next(extra)) if one else float(value) if isinstance(value, Real) else 0.0
+        for one, value in zip(fit.kinds, known, strict=True)
     )
-    modulus, times = fit.modulus, fit.relaxation_time
     if elastic > 0.0:
         modulus = np.append(modulus, elastic)
         times = np.append(times, search.elastic_time(fit))
@@ -200,7 +189,7 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
     solid = ""
     if elastic > sweep.loss_modulus[slowest]:
         solid = _SOLID.format(sweep.angular_frequency[slowest], elastic, times[-1])
-    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, solvent, elastic, solid)
+    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, None, solvent, elastic, solid)
     return replace(found, relative_error=rms(_misfit(sweep, found)))
 
 

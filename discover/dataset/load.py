@@ -15,16 +15,18 @@ from jaxtyping import Float
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
-from discover.dataset.read_run import (
-    INDEX_FILE,
-    read_run,
-    reason_to_set_aside,
-    table_of_run,
-)
+from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
 from discover.dataset.records.repeats import in_sequence
 from discover.dataset.run import Run
 from discover.dataset.tables import units
-from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table
+from discover.dataset.tables.table import (
+    Table,
+    did_you_mean_file,
+    is_inside,
+    read_bytes,
+    read_table,
+    table_in,
+)
 from discover.errors import InputError, Problems
 from discover.plain_numbers import as_number, short
 from discover.words import did_you_mean, unknown_name
@@ -148,26 +150,23 @@ def load_dataset(
     used: list[int] = []
     runs: list[Run] = []
     for row, file in enumerate(names):
+        steady = None if before is None else float(before[row])
         with problems.collected():
-            reason = reason_to_set_aside(index, row, before is not None)
-            if reason is not None:
-                aside[file] = reason
-                continue
-        used.append(row)
+            try:
+                table, factor = table_of_run(root, file), float(factors[row])
+                runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
+                used.append(row)
+            except SetAside as why:
+                aside[file] = str(why)
     if aside and not used and not problems:
         raise InputError(
             f"No run of {name!r} can be fitted: {names[0]} is set aside, since {aside[names[0]]}."
         )
-    for row in used:
-        steady = None if before is None else float(before[row])
-        with problems.collected():
-            table, factor = table_of_run(root, names[row]), float(factors[row])
-            runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
     problems.require_none(name)
     if sequence is not None and runs:
         runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]
     provenance, path = "", root / PROVENANCE_FILE
-    if os.path.isfile(path) and _is_inside(root, PROVENANCE_FILE):
+    if os.path.isfile(path) and is_inside(root, PROVENANCE_FILE):
         provenance = read_bytes(path, path.name).decode("utf-8", "replace")
     return Dataset(name, tuple(runs), sweep, provenance, {**unused, **aside}, tables)
 
@@ -211,7 +210,7 @@ def read_index(root: Path) -> Table:
             problems.add(f"{where} names {name!r}; no file is named so. Correct it.")
         elif name in seen:
             problems.add(f"{INDEX_FILE} names {name} twice, again on line {line}; keep one.")
-        elif not _is_inside(root, name):
+        elif not is_inside(root, name):
             problems.add(
                 f"{where} names {name!r}, which lies outside the folder or is a link to there. Put "
                 "the file itself in the folder and name it without a path."
@@ -219,13 +218,6 @@ def read_index(root: Path) -> Table:
         seen.add(name)
     problems.require_none(INDEX_FILE)
     return index
-
-
-def _is_inside(root: Path, name: str) -> bool:
-    try:
-        return (root / name).resolve().is_relative_to(root.resolve())
-    except (OSError, RuntimeError, ValueError):  # too long, or a link to itself
-        return False
 
 
 def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
@@ -253,19 +245,10 @@ def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs
 
 
 def find_sweep(root: Path) -> LinearSweep | None:
-    """Return the linear sweep of a folder, or None if it has none; InputError if it is wrong."""
-    if not os.path.lexists(root / SWEEP_FILE):
+    """Return the linear sweep of a folder, sorted; None without one, InputError if it is wrong."""
+    table = table_in(root, SWEEP_FILE)
+    if table is None:
         return None
-    if not _is_inside(root, SWEEP_FILE):
-        raise InputError(
-            f"{SWEEP_FILE} is a link to outside the folder. Put the file itself in the folder."
-        )
-    return read_sweep(root / SWEEP_FILE)
-
-
-def read_sweep(path: Path) -> LinearSweep:
-    """Return a linear frequency sweep, sorted; InputError if it is wrong."""
-    table = read_table(path)
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     columns = table.all_required(*quantities)
     table.require_positive(*quantities)

@@ -1,6 +1,5 @@
 """Tables of material functions beside the runs, as runs that can be fitted with them."""
 
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,7 @@ from jaxtyping import Float
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.run import Run
 from discover.dataset.tables import units
-from discover.dataset.tables.table import Table, read_table
+from discover.dataset.tables.table import Table, table_in
 from discover.errors import InputError
 from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import after_step_strain
@@ -32,17 +31,12 @@ def read_material_functions(
     """
     found, aside = {}, {}
     for kind, read in _READERS.items():
-        path = root / f"{kind}.csv"
-        if path.name in runs or not os.path.lexists(path):
+        name = f"{kind}.csv"
+        if name in runs or (table := table_in(root, name)) is None:
             continue
-        if not path.resolve().is_relative_to(root.resolve()):
-            raise InputError(
-                f"{path.name} is a link to outside the folder. Put the file itself in the folder."
-            )
-        table = read_table(path)
         if kind == "amplitude_sweep" and table.quantity(units.ANGULAR_FREQUENCY) is None:
             if frequency is None:
-                aside[path.name] = (
+                aside[name] = (
                     "it has no column omega_rad_s, and moduli belong to a frequency. Add it, or "
                     "write amplitude_sweep_rad_s in [data]"
                 )

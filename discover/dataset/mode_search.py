@@ -1,7 +1,7 @@
 """Relaxation modes, solvent viscosity and elastic constant that a linear sweep supports."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from typing import Any, Literal
@@ -17,7 +17,7 @@ BEYOND = 1.0
 # repeated sweeps, and of digits in exported files
 REPEATABILITY = 0.002
 _PER_DECADE = 12
-_ROUGHLY, _CLOSELY = (1e-6, 20), (1e-12, 200)  # tolerance and most evaluations of a fit
+_ROUGHLY, CLOSELY = (1e-6, 20), (1e-12, 200)  # tolerance and most evaluations of a fit
 _LONGEST = 1e12
 
 
@@ -26,32 +26,15 @@ class ModeFit:
     """Least-squares fit of modes, a solvent and an elastic constant to a sweep."""
 
     relaxation_time: Float[np.ndarray, " k"]  # in s, increasing
-    modulus: Float[np.ndarray, " k"]  # in Pa
-    solvent_viscosity: float | None = None  # in Pa s; None where it was not fitted
-    elastic_modulus: float | None = None  # in Pa; likewise
-    squared: float = np.inf  # sum of the squared relative misfits of G′ and G″
-    criterion: float = np.inf  # twice the negative log evidence; the smallest is the best
-
-    @property
-    def kinds(self) -> tuple[bool, bool]:
-        """Whether solvent and elastic constant were fitted."""
-        return self.solvent_viscosity is not None, self.elastic_modulus is not None
-
-    @property
-    def extra(self) -> np.ndarray:
-        """Those of the two that were, shape (0 to 2,)."""
-        both = (self.solvent_viscosity, self.elastic_modulus)
-        return np.array([value for value in both if value is not None])
-
-    @property
-    def n_constants(self) -> int:
-        """Number of fitted constants."""
-        return 2 * len(self.modulus) + sum(self.kinds)
+    # moduli in Pa, then the viscosity of a solvent in Pa s and an elastic constant in Pa, if fitted
+    amounts: Float[np.ndarray, " c"]
+    kinds: tuple[bool, bool]  # whether these two are
+    squared: float  # sum of the squared relative misfits of G′ and G″
 
     @property
     def n_modes(self) -> int:
         """Number of modes, that of an elastic constant included."""
-        return len(self.modulus) + self.kinds[1]
+        return len(self.relaxation_time) + self.kinds[1]
 
 
 def relative_moduli(
@@ -108,10 +91,6 @@ class ModeSearch:
         for solvent, elastic in product(*choices):
             yield from self._path(solvent, elastic, fewest)
 
-    def closely(self, fit: ModeFit) -> ModeFit:
-        """Return a fit carried on until nothing changes."""
-        return self._fitted(fit, _CLOSELY) if len(fit.modulus) else fit
-
     def elastic_time(self, fit: ModeFit) -> float:
         """Shortest time in s of a mode that raises the misfit by one standard deviation at most."""
         solvent, target = fit.kinds[0], self._target
@@ -128,7 +107,8 @@ class ModeSearch:
 
     def _variance(self, fit: ModeFit) -> float:
         """Return the variance of the misfit, no less than what sweeps repeat to."""
-        return fit.squared / max(self.measured.size - fit.n_constants, 1) + REPEATABILITY**2
+        n_constants = len(fit.relaxation_time) + len(fit.amounts)
+        return fit.squared / max(self.measured.size - n_constants, 1) + REPEATABILITY**2
 
     def _design(self, times, solvent: bool, elastic: bool) -> Float[np.ndarray, "rows c"]:
         return relative_moduli(self.frequency, self.measured, times, solvent, elastic)
@@ -147,10 +127,10 @@ class ModeSearch:
         least = max(fewest - elastic, 0 if elastic else 1)
         while True:
             amounts, squared = solved(self._design(times, solvent, elastic), self._target)
-            fit = self._named(np.sort(times), amounts, solvent, elastic, squared)
+            fit = ModeFit(np.sort(times), amounts, (solvent, elastic), squared)
             if len(times) <= most:
-                fit = self._fitted(fit, _ROUGHLY)
-                if np.all(np.append(fit.modulus, fit.extra) > 0.0):
+                fit = self.fitted(fit, _ROUGHLY)
+                if np.all(fit.amounts > 0.0):
                     yield fit
             if len(times) <= least:
                 return
@@ -166,10 +146,10 @@ class ModeSearch:
 
     def _with_one_less(self, fit: ModeFit) -> np.ndarray:
         """Return times with one mode left out, or two made one, at the least cost."""
-        times, modulus = fit.relaxation_time, fit.modulus
+        times = fit.relaxation_time
         trials = [np.delete(times, i) for i in range(len(times))]
         for i in range(len(times) - 1):
-            between = _mean(times[i : i + 2], modulus[i : i + 2])
+            between = _mean(times[i : i + 2], fit.amounts[i : i + 2])
             trials.append(np.concatenate([times[:i], [between], times[i + 2 :]]))
         costs = [
             solved(self._design(t, *fit.kinds), self._target)[1] if len(t) or any(fit.kinds)
@@ -178,21 +158,14 @@ class ModeSearch:
         ]  # fmt: skip
         return trials[int(np.argmin(costs))]
 
-    def _named(self, times, amounts, solvent: bool, elastic: bool, squared: float) -> ModeFit:
-        viscosity = float(amounts[len(times)]) if solvent else None
-        constant = float(amounts[-1]) if elastic else None
-        fit = ModeFit(times, amounts[: len(times)], viscosity, constant, float(squared))
-        return replace(fit, criterion=self._criterion(fit))
-
-    def _fitted(self, fit: ModeFit, limits: tuple[float, int]) -> ModeFit:
+    def fitted(self, fit: ModeFit, limits: tuple[float, int]) -> ModeFit:
         """Return the fit with the relaxation times fitted jointly, in logarithms."""
         tolerance, evaluations = limits
-        k, kinds = len(fit.modulus), fit.kinds
+        k, kinds = len(fit.relaxation_time), fit.kinds
         if not k:
             return fit
         low, high = np.log(self.bounds)
-        amounts = np.append(fit.modulus, fit.extra)
-        amounts = np.maximum(amounts, 1e-6 * np.max(amounts[:k], initial=1e-300))
+        amounts = np.maximum(fit.amounts, 1e-6 * np.max(fit.amounts[:k], initial=1e-300))
 
         def misfit(logs: np.ndarray) -> np.ndarray:
             times = np.exp(np.clip(logs[:k], low, high))
@@ -217,9 +190,9 @@ class ModeSearch:
         times, amounts = np.exp(np.clip(end[:k], low, high)), np.exp(end[k:])
         order = np.argsort(times)
         amounts = np.append(amounts[:k][order], amounts[k:])
-        return self._named(times[order], amounts, *kinds, float(np.sum(misfit(end) ** 2)))
+        return ModeFit(times[order], amounts, kinds, float(np.sum(misfit(end) ** 2)))
 
-    def _criterion(self, fit: ModeFit) -> float:
+    def criterion(self, fit: ModeFit) -> float:
         """Return twice the negative log evidence   [Schwarz 1978, Ann. Stat. 6, 461].
 
         Solvent and elastic constant have an even prior from zero to the most that the sweep leaves
@@ -227,7 +200,7 @@ class ModeSearch:
         """
         count = self.measured.size
         variance = self._variance(fit)
-        total = count * np.log(variance) + 2 * len(fit.modulus) * np.log(count)
+        total = count * np.log(variance) + 2 * len(fit.relaxation_time) * np.log(count)
         if not any(fit.kinds):
             return float(total)
         design = self._design(fit.relaxation_time, *fit.kinds)

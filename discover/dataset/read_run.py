@@ -42,6 +42,10 @@ _OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
 Values = Float[np.ndarray, " n"]
 
 
+class SetAside(InputError):
+    """Why a run cannot be fitted, though nothing is wrong with it."""
+
+
 class DeclaredTest(NamedTuple):
     """What a line of ``runs.csv`` says was done."""
 
@@ -56,7 +60,8 @@ class DeclaredTest(NamedTuple):
 def declared_test(index: Table, row: int, rate_before: float | None) -> DeclaredTest:
     """Return which test the run on a line of ``runs.csv``, from 0, is; InputError if it is none.
 
-    `rate_before`: of the steady flow before it, in 1/s, where the study says so.
+    `rate_before`: of the steady flow before it, in 1/s, where the study says so. Raises SetAside
+    if there was such a flow and nobody says its rate.
     """
     flow, control, start = (_word(index, row, column) for column in _VALUES)
     step, time = (_number(index, row, column) for column in ("step_strain", "step_time_s"))
@@ -75,15 +80,12 @@ def declared_test(index: Table, row: int, rate_before: float | None) -> Declared
     if both:
         raise InputError(f"{where} declares both {both}. Leave one of them out.")
     _number(index, row, "temperature_C")
+    if start == "steady" and rate_before is None:
+        raise SetAside(
+            "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
+            "flow in the study (rate_before)"
+        )
     return DeclaredTest(flow, control, start, step, time, rate_before or 0.0)
-
-
-def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None:
-    """Why a run cannot be fitted; None if it can, or the rate before it is known."""
-    start = declared_test(index, row, None).start
-    why = "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
-    why += "flow in the study (rate_before)"
-    return why if start == "steady" and not rate_before else None
 
 
 def _word(index: Table, row: int, column: str) -> str:

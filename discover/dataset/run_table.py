@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 
 from discover.dataset.run import SLOWEST_RATE, Run
 from discover.protocols.control import jumps_at_start
@@ -92,9 +92,11 @@ def wave_of(
         found, *_ = np.linalg.lstsq(waves, rate, rcond=None)
         return found, rate - waves @ found
 
-    nearby = (0.8 * about, 1.2 * about)
-    best = minimize_scalar(lambda x: np.sum(fitted(x)[1] ** 2), bounds=nearby, method="bounded")
-    frequency = float(best.x)  # pyright: ignore[reportAttributeAccessIssue]
+    def misfit(frequency: float) -> float:
+        return float(np.sum(fitted(frequency)[1] ** 2))
+
+    best = fminbound(misfit, 0.8 * about, 1.2 * about, xtol=1e-9 * about)
+    frequency = np.asarray(best).item()
     found, left = fitted(frequency)
     amplitude = float(np.hypot(found[0], found[1]))
     if left @ left > (1.0 - least) * (rate @ rate) or abs(found[2]) > 0.2 * amplitude:

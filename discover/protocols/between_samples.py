@@ -47,10 +47,7 @@ def sampled_rate(
     Straight lines between the samples of a wave cut its crests: read seven times a cycle it loses
     7 % of its amplitude, which bends the constants of a law that is fitted to the stress.
 
-    Parameters
-    ----------
-    times, rates
-        In s, strictly increasing, and in 1/s, shape (n,). InputError if they are none.
+    `times`, `rates`: in s, strictly increasing, and in 1/s, shape (n,); else InputError.
     """
     straight = measured_rate(times, rates)
     t, r = np.asarray(straight.table_times), np.asarray(straight.table_rates)

@@ -62,28 +62,24 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
             f"{len(times)} samples, the largest stress {size:g} Pa. Leave the run out."
         )
     gap = float(times[1] - times[0]) if times[0] == 0.0 else float(times[0])
-    at_once = _jumps_at_once(stress, size)
+    first = abs(float(stress[0]))
+    at_once = first > _JUMP * size and abs(float(stress[1] - stress[0])) < _LEVEL * first
     begins = -_AT_ONCE * gap if at_once else 0.0
     start = [[begins, 0.0], [0.0, stress[0]]] if at_once else [[0.0], [0.0]]
     if times[0] == 0.0:
         start = [column[:-1] for column in start]
     jumps = _jumps(stress, size)
     parts = [np.array(start)]
-    for first, end in pairwise([0, *(jumps + 1), len(times)]):
-        if first > 0:
-            jumped = times[first - 1] + _AT_ONCE * (times[first] - times[first - 1])
-            parts.append(np.array([[jumped], [stress[first]]]))
-        piece = np.stack([times[first:end], stress[first:end]])
-        if first == 0 and not at_once and times[0] > 0.0:
+    for begin, end in pairwise([0, *(jumps + 1), len(times)]):
+        if begin > 0:
+            jumped = times[begin - 1] + _AT_ONCE * (times[begin] - times[begin - 1])
+            parts.append(np.array([[jumped], [stress[begin]]]))
+        piece = np.stack([times[begin:end], stress[begin:end]])
+        if begin == 0 and not at_once and times[0] > 0.0:
             piece, parts = np.concatenate([parts[0], piece], axis=1), []
         parts.append(np.stack(knots_between(*piece)))
     knots, levels = np.concatenate(parts, axis=1)
     return replace(measured_rate(knots, levels), control="stress", begins=jnp.asarray(begins))
-
-
-def _jumps_at_once(stress: Float[np.ndarray, " n"], size: float) -> bool:
-    first = abs(float(stress[0]))
-    return first > _JUMP * size and abs(float(stress[1] - stress[0])) < _LEVEL * first
 
 
 def _jumps(stress: Float[np.ndarray, " n"], size: float) -> Int[np.ndarray, " j"]:

@@ -129,16 +129,12 @@ def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinema
         raise InputError(unknown_name("flow", kind, KINDS))
     gradient = np.array(_GRADIENT[kind])
     rate = _rate(gradient)
-    recorded = np.array(_RECORDED[quantity or recorded_name(kind)])
+    usual: RecordedQuantity = "sigma12" if kind == "shear" else "tensile_stress"
+    recorded = np.array(_RECORDED[quantity or usual])
     intensity = np.sqrt(0.5 * rate @ (rate * np.array([1.0, 1.0, 1.0, 2.0])))
     return Kinematics(
         *(on_device(part) for part in (gradient, recorded, intensity, recorded @ rate))
     )
-
-
-def recorded_name(kind: str) -> RecordedQuantity:
-    """Return what is recorded in a flow by default: σ12, or the tensile stress."""
-    return "sigma12" if kind == "shear" else "tensile_stress"
 
 
 def quantity_of(kinematics: Kinematics | None) -> RecordedQuantity:

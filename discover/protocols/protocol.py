@@ -2,17 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import ModuleType
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from numpy.typing import ArrayLike
+from scipy.integrate import cumulative_trapezoid
 
 from discover.errors import InputError
 from discover.plain_numbers import as_numbers, short
-from discover.programs import compiled, on_device
+from discover.programs import on_device
 from discover.protocols.kinematics import (
     MODULI,
     Control,
@@ -92,53 +94,25 @@ class FlowProtocol(eqx.Module):
     def rate(self, time: Float[Array, ""]) -> Float[Array, ""]:
         """Return γ̇(t) in 1/s, in extension the Hencky rate; at a jump, the value after it."""
         time = jnp.asarray(time)
-        table = _interpolate(time, self.table_times, self.table_rates)
+        table = _in_table(jnp, time, self.table_times, self.table_rates)
         waves = self.amplitudes * jnp.cos(self.frequencies * time + self.phases)
         return table + jnp.sum(waves)
 
     def strain_in_table(self, time: Float[Array, ""]) -> Float[Array, ""]:
         """Return the strain that belongs to the table, such as the amplitude of an oscillation."""
         assert self.table_strains is not None
-        return _interpolate(jnp.asarray(time), self.table_times, self.table_strains)
-
-    def strain(self, time: Float[Array, ""]) -> Float[Array, ""]:
-        """Return the strain since t = 0, exactly integrated."""
-        times, rates = self.table_times, self.table_rates
-        # Integral of the table from its first entry, at each entry
-        areas = 0.5 * (rates[1:] + rates[:-1]) * jnp.diff(times)
-        cumulative = jnp.concatenate([jnp.zeros(1), jnp.cumsum(areas)])
-
-        def area(t):
-            i = jnp.clip(jnp.searchsorted(times, t, side="right") - 1, 0, times.shape[0] - 1)
-            before = jnp.minimum(t - times[0], 0.0) * rates[0]
-            inside = jnp.maximum(t - times[i], 0.0)
-            return (
-                cumulative[i] + before + 0.5 * inside * (rates[i] + _interpolate(t, times, rates))
-            )
-
-        def wave(t):
-            slow = self.frequencies == 0.0
-            frequency = jnp.where(slow, 1.0, self.frequencies)
-            oscillating = jnp.sin(self.frequencies * t + self.phases) / frequency
-            return jnp.sum(self.amplitudes * jnp.where(slow, t * jnp.cos(self.phases), oscillating))
-
-        zero = jnp.zeros_like(time)
-        return area(time) - area(zero) + wave(time) - wave(zero)
+        return _in_table(jnp, jnp.asarray(time), self.table_times, self.table_strains)
 
 
-def _interpolate(
-    time: Float[Array, ""], times: Float[Array, " m"], values: Float[Array, " m"]
-) -> Float[Array, ""]:
-    # jnp.interp leaves the value at a repeated abscissa (a jump) undefined
-    if times.shape[0] == 1:
-        return values[0]
-    left = jnp.clip(jnp.searchsorted(times, time, side="right") - 1, 0, times.shape[0] - 2)
-    width = times[left + 1] - times[left]
-    jump = width <= 0.0
-    fraction = (time - times[left]) / jnp.where(jump, 1.0, width)
-    fraction = jnp.where(jump, (time >= times[left]).astype(fraction.dtype), fraction)
-    fraction = jnp.clip(fraction, 0.0, 1.0)
-    return values[left] + fraction * (values[left + 1] - values[left])
+def _in_table(xp: ModuleType, times: Any, knots: Any, values: Any) -> Any:
+    """Return at times what a table holds, straight between its knots; `xp`: NumPy or JAX's."""
+    # interp leaves the value at a repeated abscissa (a jump) undefined
+    if knots.size == 1:
+        return xp.full(times.shape, values[0])
+    left = xp.clip(xp.searchsorted(knots, times, side="right") - 1, 0, knots.size - 2)
+    width, after = knots[left + 1] - knots[left], times - knots[left]
+    share = xp.where(width > 0.0, after / xp.where(width > 0.0, width, 1.0), after >= 0.0)
+    return values[left] + xp.clip(share, 0.0, 1.0) * (values[left + 1] - values[left])
 
 
 def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -204,10 +178,8 @@ def start_up(rate: float) -> FlowProtocol:
 def step_rates(times: Sequence[float], rates: Sequence[float]) -> FlowProtocol:
     """Return a shear rate that jumps to ``rates[i]`` at ``times[i]``.
 
-    Parameters
-    ----------
-    times, rates
-        In s, increasing, and in 1/s, as many; the first rate also holds before ``times[0]``.
+    `times`, `rates`: in s, increasing, and in 1/s, as many, shape (n,); the first rate also holds
+    before ``times[0]``.
     """
     t, r = _pair("step_rates", times, rates)
     # each jump is a pair of entries at one time
@@ -221,12 +193,8 @@ def measured_rate(
 ) -> FlowProtocol:
     """Return the piecewise-linear shear rate through measured points.
 
-    Of few samples a cycle straight lines cut the crests: `sampled_rate` does not.
-
-    Parameters
-    ----------
-    times, rates
-        In s, strictly increasing, and in 1/s, as many.
+    `times`, `rates`: in s, strictly increasing, and in 1/s, as many, shape (n,). Of few samples a
+    cycle straight lines cut the crests: `sampled_rate` does not.
 
     Examples
     --------
@@ -308,46 +276,38 @@ def recorded_at(
 
 def shear_rates(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return γ̇ in 1/s at many times in s, shape (n,)."""
-    amplitudes, frequencies, phases = (
-        np.asarray(of) for of in (protocol.amplitudes, protocol.frequencies, protocol.phases)
-    )
+    # in NumPy, as all below: without a program for each length
+    knots, rates, amplitudes, frequencies, phases = _in_numpy(protocol)
     waves = np.cos(np.outer(times, frequencies) + phases) @ amplitudes
-    return _in_table(times, protocol.table_times, protocol.table_rates) + waves
+    return _in_table(np, np.asarray(times), knots, rates) + waves
 
 
 def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return the strain since t = 0 at many times in s, shape (n,)."""
-    # lengths rounded up, so that runs of all lengths share a few programs
-    n = len(times)
-    entries, size = (1 << (k - 1).bit_length() for k in (protocol.table_times.shape[0], n))
-    padded = _padded(protocol, entries, protocol.amplitudes.shape[0])
-    held = on_device(np.pad(times, (0, size - n), mode="edge"))
-    return np.asarray(_strains(padded, held))[:n]
-
-
-@compiled
-def _strains(protocol: FlowProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
-    return jax.vmap(protocol.strain)(times)
+    """Return the strain since t = 0 at many times in s, exactly integrated, shape (n,)."""
+    knots, rates, amplitudes, frequencies, phases = _in_numpy(protocol)
+    at_knots = cumulative_trapezoid(rates, knots, initial=0.0)
+    places = np.append(times, 0.0)
+    last = np.clip(np.searchsorted(knots, places, side="right") - 1, 0, None)
+    mean = 0.5 * (rates[last] + _in_table(np, places, knots, rates))
+    area = at_knots[last] + (places - knots[last]) * mean
+    # the integral of a cosine from 0 on, that of a constant too
+    half = 0.5 * np.outer(times, frequencies)
+    waves = (np.cos(half + phases) * np.sinc(half / np.pi)) @ amplitudes
+    return area[:-1] - area[-1] + times * waves
 
 
 def strains_in_table(
     protocol: FlowProtocol, times: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
     """Return the strains of the table at many times, such as amplitudes, shape (n,)."""
-    assert protocol.table_strains is not None
-    return _in_table(times, protocol.table_times, protocol.table_strains)
+    table = np.asarray(protocol.table_times), np.asarray(protocol.table_strains)
+    return _in_table(np, np.asarray(times), *table)
 
 
-def _in_table(times: ArrayLike, knots: ArrayLike, values: ArrayLike) -> Float[np.ndarray, " n"]:
-    """Return `_interpolate` at many times, in numpy: without a program for each length."""
-    times, knots, values = map(np.asarray, (times, knots, values))
-    if knots.size == 1:
-        return np.full(times.shape, values[0])
-    left = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, knots.size - 2)
-    width = knots[left + 1] - knots[left]
-    after = times - knots[left]
-    share = np.where(width > 0.0, after / np.where(width > 0.0, width, 1.0), after >= 0.0)
-    return values[left] + np.clip(share, 0.0, 1.0) * (values[left + 1] - values[left])
+def _in_numpy(protocol: FlowProtocol) -> list[np.ndarray]:
+    """Return times and rates of the table; amplitudes, frequencies and phases of the cosines."""
+    names = "table_times", "table_rates", "amplitudes", "frequencies", "phases"
+    return [np.asarray(getattr(protocol, name)) for name in names]
 
 
 TRAINING_DURATION = 20.0

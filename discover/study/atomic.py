@@ -6,7 +6,7 @@ import secrets
 import socket
 import stat
 import weakref
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 from discover.errors import InputError
@@ -67,26 +67,17 @@ def replaceable(path: Path) -> os.stat_result | None:
     return found
 
 
-def require_ours(folder: Path, names: Sequence[str], mark: str) -> None:
+def require_free(folder: Path, names: Iterable[str], mark: str | None = None) -> None:
     """Refuse a folder that holds files of these names, unless `mark`, written first, is there."""
-    if os.path.lexists(folder / mark):
+    there = next((name for name in names if os.path.lexists(folder / name)), None)
+    if there is None or (mark is not None and os.path.lexists(folder / mark)):
         return
-    there = next((name for name in names if os.path.lexists(folder / name)), None)
-    if there is not None:
-        raise InputError(
-            f"{folder} holds a {there} that is not a result of this command. Use --overwrite to "
-            "replace it, or another --out."
-        )
-
-
-def require_free(folder: Path, names: Iterable[str], overwrite: bool) -> None:
-    """Refuse a folder that holds a file of one of these names, unless it is to be replaced."""
-    there = next((name for name in names if os.path.lexists(folder / name)), None)
-    if there is not None and not overwrite:
-        raise InputError(
-            f"{folder} holds a {there} already. Use --overwrite to replace the files of the same "
-            "names, or another --out."
-        )
+    which, them = "that is not a result of this command", "it"
+    if mark is None:
+        which, them = "already", "the files of the same names"
+    raise InputError(
+        f"{folder} holds a {there} {which}. Use --overwrite to replace {them}, or another --out."
+    )
 
 
 def make_folder(path: str | Path) -> Path:

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import MODULI
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.from_result import result_file
-from discover.study.schema import Study
+from discover.study.schema import Data, Study
 from discover.validation import validated
 from discover.words import unknown_name
 
@@ -64,12 +64,16 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
             options[key] = getattr(data, key)
         dataset = load_dataset(str(data.folder), base=_base(study), **options)
     each = data.held_out == "each"
-    named = () if data.held_out == "each" else data.held_out
-    dataset, named, fit = _with_tables(dataset, study, named)
+    dataset, roles = _with_tables(dataset, data)
+    judges = (name for name, role in roles.items() if role == "judge")
+    named = list(dict.fromkeys([*(() if data.held_out == "each" else data.held_out), *judges]))
+    beside = (name for name, role in roles.items() if role == "fit")
+    fit = list(dict.fromkeys([*(data.fit or dataset.names), *beside]))
+    fit_names = [name for name in fit if name not in named]
     if data.observe is not None:
-        dataset, named, fit_names = _observed(dataset, data.observe, named, fit)
-    else:
-        fit_names = tuple(fit or (name for name in dataset.names if name not in named))
+        dataset.select([*named, *fit_names])  # names that do not exist are refused
+        asked = fit if data.fit else ()
+        dataset, named, fit_names = _observed(dataset, data.observe, named, fit_names, asked)
     held_out = dataset.select(named)
     if not len(dataset):
         raise InputError(
@@ -90,16 +94,13 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     return StudyData(dataset, fit, held_out, each)
 
 
-def _with_tables(
-    dataset: Dataset, study: Study, held_out: tuple[str, ...]
-) -> tuple[Dataset, tuple[str, ...], tuple[str, ...] | None]:
-    """Return the data with the tables beside the runs among them, those held out, and those fitted.
+def _with_tables(dataset: Dataset, data: Data) -> tuple[Dataset, dict[str, str]]:
+    """Return the data with the tables beside the runs among them, and the role of each of those.
 
     A table tests, unless the study says that it is fitted or there is nothing else to fit.
     """
-    data = study.data
     kinds = (*TABLES, "lve")
-    asked = {kind: getattr(data, kind) for kind in kinds if getattr(data, kind) is not None}
+    asked = {kind: role for kind in kinds if (role := getattr(data, kind)) is not None}
     dataset.with_material_functions(list(asked))  # those that are not there are refused
     there = list(dataset.material_functions)
     # the linear sweep gives the modes, and is no test unless it is asked for
@@ -109,29 +110,19 @@ def _with_tables(
     if data.held_out == "each":
         # each run tests in turn, and nothing beside them
         roles = {kind: role for kind, role in roles.items() if role == "fit" or kind in asked}
-    if not roles:
-        return dataset, held_out, data.fit
-    fitted, judging = (
-        tuple(
-            run.name
-            for kind, role in roles.items()
-            if role == wanted
-            for run in replace(dataset, runs=()).with_material_functions([kind])
-        )
-        for wanted in ("fit", "judge")
-    )
-    fit = None if data.fit is None else (*data.fit, *(n for n in fitted if n not in data.fit))
-    return dataset.with_material_functions(list(roles)), (*held_out, *judging), fit
+    whole = dataset.with_material_functions(list(roles))
+    of_tables = whole.runs[len(dataset) :]
+    return whole, {run.name: roles[run.source.removesuffix(".csv")] for run in of_tables}
 
 
 def _observed(
-    dataset: Dataset, observe: Sequence[str], held_out: Sequence[str], fit: Sequence[str] | None
-) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
+    dataset: Dataset, observe: Sequence[str], held_out: Sequence[str], fit: Sequence[str],
+    asked: Sequence[str],
+) -> tuple[Dataset, list[str], list[str]]:  # fmt: skip
     """Return the data with every quantity as a record, those held out, and those fitted.
 
-    What is recorded and not observed only tests.
+    What is recorded and not observed only tests. `asked`: runs that must have something to fit.
     """
-    dataset.select([*held_out, *(fit or ())])  # names that do not exist are refused
     whole = dataset.quantity_by_quantity()
     missing = set(observe) - {run.quantity for run in whole}
     if missing:
@@ -140,32 +131,20 @@ def _observed(
         raise InputError(
             f"[data] observe: {unknown_name('quantity', sorted(missing)[0], there, its)}{left}"
         )
-    wanted = dataset.names if fit is None else fit
     by_name = {run.name: [] for run in dataset}
     for run in whole:
         by_name[run.name if run.quantity in MODULI else run.source].append(run)
     # both moduli of a sweep are fitted, unless one of them is named
     observed = set(observe) if set(observe) & set(MODULI) else {*observe, *MODULI}
-    for name in fit or ():
+    for name in asked:
         if not any(run.quantity in observed for run in by_name[name]):
             raise InputError(
                 f"[data] fit names {name!r}, which recorded nothing that is in observe = "
                 f"{list(observe)}. Leave the run out of fit, or add what it recorded to observe."
             )
-    fitted = [
-        run.name
-        for name in wanted
-        if name not in held_out
-        for run in by_name[name]
-        if run.quantity in observed
-    ]
-    judging = [
-        run.name
-        for name in (*held_out, *(name for name in wanted if name not in held_out))
-        for run in by_name[name]
-        if run.name not in fitted
-    ]
-    return whole, tuple(judging), tuple(fitted)
+    fitted = [run.name for name in fit for run in by_name[name] if run.quantity in observed]
+    beside = [run.name for name in (*held_out, *fit) for run in by_name[name]]
+    return whole, [name for name in beside if name not in fitted], fitted
 
 
 def read_study(path: str | Path) -> Study:

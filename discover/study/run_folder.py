@@ -11,7 +11,7 @@ from typing import Any
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.plain_numbers import parse_json
-from discover.study.atomic import PART_SUFFIX, lock_folder, make_folder, require_ours, write_text
+from discover.study.atomic import PART_SUFFIX, lock_folder, make_folder, require_free, write_text
 
 STATE_FOLDER = "state"
 STATE_FILE = "study.json"
@@ -37,7 +37,7 @@ class RunFolder:
         with _writable(f"The folder {self.path} cannot be written to", "with"):
             self._lock = lock_folder(self.path)
         if not overwrite:
-            require_ours(self.path, _RESULTS, STATE_FOLDER)
+            require_free(self.path, _RESULTS, STATE_FOLDER)
         found = _read_json(self._state / STATE_FILE)
         if overwrite:
             # only what this class writes is removed: the folder may be somebody's home

@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from fewer_hypotheses import few_candidates, verdict_alone
+from made_exports import write_runs
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -69,16 +70,9 @@ def undrawn(monkeypatch):
 
 
 def data_folder(path, **columns):
-    path.mkdir(parents=True)
-    (path / "runs.csv").write_text("file\na.csv\n")
     t = np.linspace(0.0, 2.0, 12)
-    table = {"time_s": t, "shear_rate_1_s": np.ones(12), "stress_Pa": 1.0 - np.exp(-t), **columns}
-    rows = [
-        ",".join(table),
-        *(",".join(map(str, row)) for row in zip(*table.values(), strict=True)),
-    ]
-    (path / "a.csv").write_text("\n".join(rows))
-    return path
+    table = {"time_s": t, "shear_rate_1_s": np.ones(12), "stress_Pa": 1.0 - np.exp(-t)}
+    return write_runs(path, table | columns)
 
 
 @pytest.mark.slow
@@ -140,19 +134,6 @@ def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
     assert sorted(trained) == ["tbnn_ude", "tensor_sindy"]  # side by side, in either order
 
 
-def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypatch):
-    def broken(*args, **kwargs):
-        raise RuntimeError("it broke\nin two lines")
-
-    monkeypatch.setattr("discover.comparison.run_comparison.search_hypotheses", broken)
-    data_folder(tmp_path / "one")
-    (tmp_path / "s.toml").write_text(ONE_RUN)
-    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 1
-    assert result.stderr.strip().count("\n") == 0
-    assert "RuntimeError: it broke" in result.stderr
-
-
 @pytest.mark.slow
 def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, trained, undrawn):
     to_fit = 'modulus_Pa = "fit"\nrelaxation_time_s = "fit"\n'
@@ -173,12 +154,11 @@ def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, tra
 
 
 BAD_STUDIES = {
+    "missing": (None, "bad.toml"),
     "not_toml": ("[data\n", "not valid TOML"),
-    "unknown_key": (STUDY + "\n[compar]\n", "'compar'"),
-    "wrong_law": (STUDY.replace('"giesekus"', '"gieskus"'), "gieskus"),
     "wrong_parameter": (STUDY.replace("alpha", "beta"), "'beta'"),
     "parameter_out_of_range": (STUDY.replace("0.2", "3.0"), "'alpha'"),
-    "nan_noise": (STUDY.replace("0.01", "nan"), "noise"),
+    "nan_in_a_run": ('[data]\nfolder = "spoiled"\n', "r0.csv"),
     "no_folder": ('[data]\nfolder = "nowhere"\n', "'nowhere'"),
     "unknown_run": (STUDY.replace("[compare]", 'held_out = ["x"]\n[compare]'), "'x'"),
     "no_sweep_data": ('[data]\nfolder = "swept"\n[model]\nmodes = "lve"\n', "lve.csv"),
@@ -198,8 +178,11 @@ BAD_STUDIES = {
 @pytest.mark.parametrize("case", BAD_STUDIES)
 def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, case):
     text, word = BAD_STUDIES[case]
-    data_folder(tmp_path / "swept")  # a folder of runs without a sweep; one study names it
-    (tmp_path / "bad.toml").write_text(text)
+    # folders that one study each names: of runs without a sweep, and with a sample that is none
+    data_folder(tmp_path / "swept")
+    data_folder(tmp_path / "spoiled", stress_Pa=np.where(np.arange(12) == 4, np.nan, 1.0))
+    if text is not None:
+        (tmp_path / "bad.toml").write_text(text)
     result = invoke(command, tmp_path / "bad.toml", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
     assert word in result.stderr
@@ -210,37 +193,19 @@ def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, cas
     assert result.stdout == ""
 
 
-@pytest.mark.parametrize("command", ["compare", "close-loop"])
-def test_a_missing_study_file_is_the_users_mistake(tmp_path, command):
-    result = invoke(command, tmp_path / "none.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "none.toml" in result.stderr
-
-
-def test_nan_in_a_run_is_named_with_its_file(tmp_path, monkeypatch):
-    stress = np.ones(12)
-    stress[4] = np.nan
-    data_folder(tmp_path / "d", stress_Pa=stress)
-    (tmp_path / "s.toml").write_text('[data]\nfolder = "d"\n')
-    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "a.csv" in result.stderr
-    assert not (tmp_path / "out" / "report.html").exists()
-
-
 def test_data_commands(tmp_path, monkeypatch):
     data_folder(tmp_path / "mine")
     monkeypatch.setenv("DISCOVER_DATA", str(tmp_path))
     assert "mine" in invoke("data", "list").output
     shown = invoke("data", "show", "mine")
     assert shown.exit_code == 0
-    assert "a.csv" in shown.output
+    assert "r0.csv" in shown.output
     assert json.loads(invoke("data", "show", "mine", "--json").stdout)["runs"][0]["samples"] == 12
     assert invoke("data", "check", "mine").exit_code == 0
     bad = data_folder(tmp_path / "bad", time_s=np.zeros(12))
     result = invoke("data", "check", bad)
     assert result.exit_code == 2
-    assert "a.csv" in result.stderr
+    assert "r0.csv" in result.stderr
     monkeypatch.delenv("DISCOVER_DATA")
     assert invoke("data", "list").exit_code == 2
 

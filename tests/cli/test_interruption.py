@@ -1,4 +1,4 @@
-"""Ctrl-C: obeyed at once, in the middle of a call that Python cannot interrupt."""
+"""How commands end: one line, a code of its own, and Ctrl-C where Python cannot be stopped."""
 
 import os
 import signal
@@ -7,9 +7,12 @@ import sys
 import time
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
 from discover.cli import console
-from discover.cli.console import INTERRUPTED, INTERRUPTED_CODE, obeying_interrupts
+from discover.cli.console import INTERRUPTED, INTERRUPTED_CODE, guarded, obeying_interrupts
+from discover.errors import InputError
 
 # a call without a Python instruction for minutes, as the compiler's are
 AT_WORK = """
@@ -77,3 +80,41 @@ def test_who_ignores_the_signal_goes_on_ignoring_it(monkeypatch):
     finally:
         signal.signal(signal.SIGINT, before)
     assert signal.set_wakeup_fd(-1) == -1
+
+
+def ended_with(error):
+    app = typer.Typer()
+
+    @app.command()
+    @guarded
+    def command() -> None:
+        raise error
+
+    return CliRunner().invoke(app, [])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "run the same command again"),
+        (InputError("there is no run 'a'"), 2, "there is no run 'a'"),
+        (PermissionError(13, "Permission denied", "out"), 1, "out"),
+        (
+            RuntimeError("it broke\nin two lines"),
+            1,
+            "RuntimeError: it broke (not your input's fault",
+        ),
+    ],
+)
+def test_each_end_has_a_code_of_its_own_and_says_what_to_do(error, code, said, monkeypatch):
+    monkeypatch.delenv("DISCOVER_DEBUG", raising=False)
+    done = ended_with(error)
+    assert done.exit_code == code
+    assert said in done.stderr
+    assert done.stderr.strip().count("\n") == 0
+    assert done.stdout == ""
+
+
+def test_a_command_that_ends_well_says_nothing():
+    done = ended_with(typer.Exit())
+    assert (done.exit_code, done.output) == (0, "")

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import Giesekus
@@ -17,7 +16,7 @@ from discover.comparison.run_comparison import data_in_words
 from discover.dataset import Dataset, Run
 from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
 from discover.laws import Fluid, make_law
-from discover.protocols import measured_rate, start_up
+from discover.protocols import measured_rate, start_up, strains
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.study import parse_study
 from discover.study.data import StudyData
@@ -156,7 +155,7 @@ def test_a_thinned_record_is_said_and_follows_the_same_strain():
     thinned = thinned_to(data, 400)
     assert "0.csv, 1.csv: kept 400 of 3,000 samples" in data_in_words(thinned, study)
     for run in (*thinned.fit, *thinned.held_out):
-        strain = float(run.protocol.strain(jnp.asarray(run.time[-1])))
+        strain = strains(run.protocol, run.time[-1:]).item()
         amplitude = float(run.name[0]) + 1.0
         # before the first sample, the first rate
         assert strain == pytest.approx(amplitude * np.sin(20.0), abs=1e-3)

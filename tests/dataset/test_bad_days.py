@@ -156,17 +156,52 @@ BY_HAND = {
     "brackets": ("time [s],shear_rate_1_s,stress_Pa\n0,1,1\n", "Rename time [s] to time_s"),
     "quote left open": (HEADER + '0,1,"1\n', "Fix the quotes"),
     "one sample of strain": ("time_s,strain,stress_Pa\n0,1,1\n", "1 samples of strain"),
+    "empty": ("", "a.csv is empty"),
+    "no stress": ("time_s,shear_rate_1_s\n0,1\n", "no column stress_Pa"),
+    "no rate": ("time_s,stress_Pa\n0,1\n", "no column shear_rate_1_s"),
+    "two stresses": ("time_s,shear_rate_1_s,stress_Pa,stress_kPa\n0,1,1,1\n", "Keep one"),
+    "code": (HEADER + "0,1,1\n1,1,__import__('os')\n", "__import__"),
+    "more cells": (HEADER + "0,1,1\n1,1,1,1,1\n", "not a comma-separated"),
+    "nan": (HEADER + "0,1,1\n1,1,nan\n", "line 3 holds nan"),
 }
+OTHERS = {
+    "runs.csv": [
+        ("name\na.csv\n", "no column 'file'"),
+        ("file\n", "no rows"),
+        ("", "is empty"),
+        ("file\n../a.csv\n", "outside the folder"),
+        ("file\n/etc/passwd\n", "outside the folder"),
+        ("file\na.csv\na.csv\n", "names a.csv twice"),
+        ("file,factor\nmissing.csv,2\n", "no file missing.csv"),
+    ],
+    "flow_curve.csv": [
+        ("shear_rate_1_s,stress_Pa\n0,1\n1,2\n", "must be positive; line 2 holds 0"),
+        ("shear_rate_1_s\n1\n", "no column stress_Pa"),
+    ],
+    "creep.csv": [
+        ("time_s,compliance_1_Pa\n1,1\n1,2\n3,4\n", "increase strictly"),
+        ("time_s,compliance_1_Pa\n1,1\n2,-2\n3,4\n", "must be positive; line 3"),
+    ],
+    "relaxation.csv": [
+        ("time_s,relaxation_modulus_Pa\n", "relaxation.csv has a header but no rows")
+    ],
+    "amplitude_sweep.csv": [("strain,omega_rad_s,Gp_Pa,Gpp_Pa\n0,1,1,1\n", "must be positive")],
+    "lve.csv": [
+        ("omega_rad_s,Gp_Pa,Gpp_Pa\n1,-5,5\n", "Gp_Pa in lve.csv must be positive"),
+        ("omega_rad_s,Gp_Pa\n1,5\n", "no column Gpp_Pa"),
+    ],
+}
+BROUGHT = [("a.csv", *case) for case in BY_HAND.values()]
+BROUGHT += [(name, *case) for name, cases in OTHERS.items() for case in cases]
 
 
-@pytest.mark.parametrize("case", BY_HAND)
-def test_what_users_bring_is_refused_with_file_place_and_remedy(tmp_path, case):
-    content, words = BY_HAND[case]
-    write(tmp_path, {"a.csv": content})
+@pytest.mark.parametrize(("name", "content", "words"), BROUGHT)
+def test_what_users_bring_is_refused_with_file_place_and_remedy(tmp_path, name, content, words):
+    write(tmp_path, {name: content})
     message = use(tmp_path)
     assert message is not None
     assert words in message
-    assert "a.csv" in message
+    assert any(file in message for file in (name, "missing.csv"))
     result = CliRunner().invoke(app, ["data", "check", str(tmp_path)])
     assert result.exit_code == 2
     assert words in result.output

@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.dataset import check_folder, load_dataset
+from discover.dataset.checking import runs as run_checks
+from discover.dataset.tables import table
 from discover.errors import InputError
 from discover.study import parse_study
 from discover.study.data import load_study_data
@@ -125,11 +127,11 @@ def test_values_that_are_new_or_repeat_by_chance_are_not_told_as_held(folder, ke
 
 @pytest.mark.parametrize(("column", "factor"), [("time_s", 1e3), ("stress_Pa", 1e-3)])
 def test_another_unit_in_one_run_is_doubted_beside_the_others(folder, column, factor):
-    runs = [start_up(rate) for rate in (0.2, 0.5, 1.0, 5.0)]
-    for table in runs:
-        del table["N1_Pa"]
-    runs[2][column] = factor * runs[2][column]
-    units = [f.file for f in check_folder(folder(*runs, sweep=False)) if f.subject == "units"]
+    made = [start_up(rate) for rate in (0.2, 0.5, 1.0, 5.0)]
+    for one in made:
+        del one["N1_Pa"]
+    made[2][column] = factor * made[2][column]
+    units = [f.file for f in check_folder(folder(*made, sweep=False)) if f.subject == "units"]
     assert units == ["r2.csv"]
 
 
@@ -320,3 +322,18 @@ def test_runs_at_rest_or_without_stress_are_refused_before_any_fit(folder):
     made((flow, stress), (0 * flow, 1e-3 * stress))
     model = declared_model(study, load_study_data(study).dataset)
     assert 0.01 < model.modulus[0] < 100
+
+
+def test_a_check_reads_and_looks_at_each_run_once_however_many_there_are(folder, monkeypatch):
+    read, looked = [], []
+
+    def counted(seen, module, name):
+        known = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda one, *rest: seen.append(one) or known(one, *rest))
+
+    root = folder(*(start_up(rate) for rate in np.geomspace(0.1, 1.0, 12)), sweep=False)
+    counted(read, table, "read_bytes")
+    counted(looked, run_checks, "_half_time")
+    assert not check_folder(root).of("error")
+    assert sorted(path.name for path in read) == sorted(path.name for path in root.glob("*.csv"))
+    assert len(looked) == 12

@@ -6,7 +6,7 @@ from made_exports import columns
 
 from discover.dataset.importing import import_files
 from discover.dataset.importing.mapping import Mapping, make_mapping
-from discover.dataset.importing.names import name_table, plain, shipped_names
+from discover.dataset.importing.names import plain, rank_of, shipped_names, tables_of
 from discover.dataset.importing.quantities import QUANTITIES
 
 RATE = [0.5, 2.0, 8.0, 32.0]
@@ -106,8 +106,7 @@ def test_the_code_page_of_the_country_is_found_from_the_names(tmp_path, language
     ],
 )  # fmt: skip
 def test_a_name_is_known_however_it_is_spelled(key, spellings):
-    known = name_table()
-    unknown = [one for one in spellings.split("§") if known.rank(key, one) is None]
+    unknown = [one for one in spellings.split("§") if rank_of(key, one) is None]
     assert not unknown
 
 
@@ -116,7 +115,7 @@ def test_a_name_is_known_however_it_is_spelled(key, spellings):
     ["Status", "Comment", "Step no", "G'/G''", "Shear str.", "Raw phase", "Set point", "RPM"],
 )
 def test_a_name_that_says_something_else_or_too_little_is_none(name):
-    assert not name_table().find(name)
+    assert not tables_of(name)
 
 
 def test_a_name_means_one_quantity_but_for_symbols_that_units_tell_apart():
@@ -150,6 +149,6 @@ def test_a_normal_stress_coefficient_times_rate_squared_is_N1(tmp_path):
 
 def test_a_number_of_the_interval_is_no_time_though_german_calls_that_intervallzeit():
     for name in ("Interval", "Segment", "Step"):
-        assert "step_time" not in name_table().find(name)
+        assert "step_time" not in tables_of(name)
     for name in ("Intervallzeit", "Interval time", "Segment time"):
-        assert "step_time" in name_table().find(name)
+        assert "step_time" in tables_of(name)

@@ -5,10 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_exports import EXACT, lines
-from typer.testing import CliRunner
+from made_exports import EXACT, imported, lines, run
 
-from discover.cli import app
 from discover.dataset import load_dataset
 from discover.dataset.importing import Mapping, import_files
 from discover.dataset.importing.text_export import blocks_of_rows
@@ -20,11 +18,6 @@ RATE = 0.7
 STRESS = 120.0 * (1 - np.exp(-TIMES)) + 3.0 * TIMES * np.exp(-TIMES)
 NORMAL = 50.0 * (1 - np.exp(-TIMES) * (1 + TIMES))
 OMEGA = np.geomspace(0.1, 100.0, 12)
-
-
-def invoke(*arguments):
-    words = ["data", "import", *(str(a) for a in arguments), "--no-page"]
-    return CliRunner().invoke(app, words)
 
 
 def trios(path, comma=False):
@@ -42,6 +35,7 @@ def trios(path, comma=False):
         text = head.replace("0.0\t25.0", "0,0\t25,0").replace("1.0\t25.1", "1,0\t25,1")
         text += "Peak hold" + body.replace(".", ",")
     path.write_bytes(text.encode("cp1252"))
+    return path
 
 
 def rheocompass(path):
@@ -57,12 +51,14 @@ def rheocompass(path):
     rows += [f"\t{i}\t{point}\tWMa,TruStrain™" for i, point in enumerate(points, start=1)]
     rows.insert(-33, f"\t7\t\t\t{RATE!r}\t\t\tinvalid")  # as the instrument writes such a point
     path.write_bytes("\r\n".join(rows).encode("utf-16"))
+    return path
 
 
 def german(path):
     rows = ["Zeit [s];Schergeschwindigkeit [1/s];Schubspannung [Pa]"]
     rows += lines(TIMES, np.full(40, RATE), STRESS, mark=";", comma=True)
     path.write_bytes(("\ufeff" + "\n".join(rows)).encode())
+    return path
 
 
 def assert_equals_original(run, normal=False, strain=False):
@@ -77,59 +73,51 @@ def assert_equals_original(run, normal=False, strain=False):
 
 @pytest.mark.parametrize("comma", [False, True])
 def test_a_trios_export_is_read_number_for_number(tmp_path, comma):
-    trios(tmp_path / "melt.txt", comma)
-    result = invoke(tmp_path / "melt.txt", "--out", tmp_path / "data")
-    assert result.exit_code == 0, result.output
+    out, result = run(tmp_path, trios(tmp_path / "melt.txt", comma))
     assert "block 1 Conditioning - 1: not a run" in result.stdout
-    run = load_dataset(tmp_path / "data")["melt-2.csv"]
-    assert_equals_original(run, normal=True)
-    assert run.metadata["source_block"] == "Peak hold - 2"
+    (test,) = load_dataset(out)
+    assert_equals_original(test, normal=True)
+    assert (test.name, test.metadata["source_block"]) == ("melt-2.csv", "Peak hold - 2")
 
 
 def test_a_rheocompass_export_is_read_and_its_invalid_point_left_out_with_a_word(tmp_path):
-    rheocompass(tmp_path / "melt.csv")
-    result = invoke(tmp_path / "melt.csv", "--out", tmp_path / "data")
-    assert result.exit_code == 0, result.output
+    out, result = run(tmp_path, rheocompass(tmp_path / "melt.csv"))
     assert "1 without all these numbers left out" in result.stdout
-    assert_equals_original(load_dataset(tmp_path / "data")["melt.csv"], strain=True)
+    assert_equals_original(load_dataset(out)["melt.csv"], strain=True)
 
 
 def test_names_in_another_language_are_given_by_hand(tmp_path):
-    german(tmp_path / "a.csv")
-    text = (tmp_path / "a.csv").read_text("utf-8-sig")
+    file = german(tmp_path / "a.csv")
+    text = file.read_text("utf-8-sig")
     for name, finnish in (("Zeit", "Aika"), ("Schergesch", "Leikkausn"), ("Schubsp", "Leikkausj")):
         text = text.replace(name, finnish)
-    (tmp_path / "a.csv").write_text(text)
-    refused = invoke(tmp_path / "a.csv", "--out", tmp_path / "data")
-    assert refused.exit_code == 2
+    file.write_text(text)
+    out, refused = run(tmp_path, file, code=2)
     assert "Leikkausjannung" in refused.stderr
     assert "--column" in refused.stderr
-    assert not (tmp_path / "data").exists()
+    assert not out.exists()
     names = ("time=Aika", "shear_rate=Leikkausnwindigkeit", "stress=Leikkausjannung")
-    options = [part for name in names for part in ("--column", name)]
-    result = invoke(tmp_path / "a.csv", "--out", tmp_path / "data", *options)
-    assert result.exit_code == 0, result.output
-    assert_equals_original(load_dataset(tmp_path / "data")["a.csv"])
+    run(tmp_path, file, *(part for name in names for part in ("--column", name)))
+    assert_equals_original(load_dataset(out)["a.csv"])
 
 
 def test_an_import_is_repeated_from_its_mapping_file_alone(tmp_path):
-    german(tmp_path / "a.csv")
-    (tmp_path / "map.toml").write_text(
+    file, mapping = german(tmp_path / "a.csv"), tmp_path / "map.toml"
+    mapping.write_text(
         '[columns]\ntime = "Zeit"\nshear_rate = "Schergeschwindigkeit"\nstress = "Schubspannung"\n'
     )
-    first, second = tmp_path / "deep" / "one", tmp_path / "two"
-    made = invoke(tmp_path / "a.csv", "--mapping", tmp_path / "map.toml", "--out", first)
-    assert made.exit_code == 0, made.output
-    again = invoke("--mapping", first / "import.toml", "--out", second)
-    assert again.exit_code == 0, again.output
-    assert (second / "a.csv").read_bytes() == (first / "a.csv").read_bytes()
-    assert (second / "runs.csv").read_bytes() == (first / "runs.csv").read_bytes()
+    first, _ = run(tmp_path, file, "--mapping", mapping)
+    second = tmp_path / "two"
+    second.mkdir()
+    again, _ = run(second, "--mapping", first / "import.toml")
+    for name in ("a.csv", "runs.csv"):
+        assert (again / name).read_bytes() == (first / name).read_bytes()
     assert str(tmp_path) not in (first / "import.toml").read_text()  # a folder may be given away
-    with (tmp_path / "a.csv").open("a") as stream:
+    with file.open("a") as stream:
         stream.write("\n31,0;0,7;120,0")
-    changed = invoke("--mapping", first / "import.toml", "--out", second, "--overwrite")
+    _, changed = run(second, "--mapping", first / "import.toml", "--overwrite")
     assert "a.csv has changed" in changed.stdout
-    assert invoke("--mapping", first / "import.toml", "--out", second).exit_code == 2
+    run(second, "--mapping", first / "import.toml", code=2)
 
 
 def test_files_in_different_units_come_back_the_same_when_repeated(tmp_path):
@@ -137,12 +125,11 @@ def test_files_in_different_units_come_back_the_same_when_repeated(tmp_path):
         rows = [f"Time [s],Shear rate [1/s],{'Stress' if name == 'a' else 'Shear stress'} [{unit}]"]
         rows += lines(TIMES, np.full(40, RATE), STRESS * factor, mark=",")
         (tmp_path / f"{name}.csv").write_text("\n".join(rows))
-    one, two = tmp_path / "one", tmp_path / "two"
-    assert invoke(tmp_path / "a.csv", tmp_path / "b.csv", "--out", one).exit_code == 0
-    assert invoke("--mapping", one / "import.toml", "--out", two).exit_code == 0
-    for folder in (one, two):
-        for run in load_dataset(folder):
-            assert_equals_original(run)
+    out, _ = run(tmp_path, tmp_path / "a.csv", tmp_path / "b.csv")
+    for _ in range(2):
+        for test in load_dataset(out):
+            assert_equals_original(test)
+        run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
 
 
 @pytest.mark.parametrize("tool", ["cone_plate", "plate_plate"])
@@ -157,25 +144,20 @@ def test_torque_and_speed_become_stress_and_rate_by_geometry(tmp_path, tool):
     rows = ["time (s),Torque (µN.m),Velocity (rpm),Normal force (N)"]
     speed = np.full(40, RATE / strain * 60 / (2 * math.pi))
     rows += lines(TIMES, STRESS / stress * 1e6, speed, NORMAL * math.pi * radius**2 / 2, mark=",")
-    (tmp_path / "a.csv").write_text("\n".join(rows), encoding="utf-8")
-    assert invoke(tmp_path / "a.csv", "--out", tmp_path / "x").exit_code == 2
-    result = invoke(tmp_path / "a.csv", "--out", tmp_path / "data", "--geometry", option)
-    assert result.exit_code == 0, result.output
-    run = load_dataset(tmp_path / "data")["a.csv"]
+    imported(tmp_path, "a.csv", rows, code=2)
+    out, _ = imported(tmp_path, "a.csv", rows, "--geometry", option)
+    (test,) = load_dataset(out)
     cone = tool == "cone_plate"
-    assert_equals_original(run, normal=cone)
-    assert (run.first_normal_stress_difference is not None) is cone
+    assert_equals_original(test, normal=cone)
+    assert (test.first_normal_stress_difference is not None) is cone
 
 
 def test_a_sweep_is_imported_beside_the_runs(tmp_path):
-    trios(tmp_path / "melt.txt")
     rows = ["Angular frequency\tStorage modulus\tLoss modulus", "rad/s\tMPa\tkPa"]
     storage, loss = OMEGA**2 / (1 + OMEGA**2), OMEGA / (1 + OMEGA**2)
     rows += lines(OMEGA, storage * 1e-6, loss * 1e-3)
     (tmp_path / "sweep.txt").write_text("\n".join(rows))
-    out = tmp_path / "data"
-    arguments = (tmp_path / "melt.txt", tmp_path / "sweep.txt", "--out", out)
-    assert invoke(*arguments).exit_code == 0
+    out, _ = run(tmp_path, trios(tmp_path / "melt.txt"), tmp_path / "sweep.txt")
     sweep = load_dataset(out).linear_sweep
     assert sweep is not None
     np.testing.assert_allclose(sweep.storage_modulus, storage, rtol=EXACT)
@@ -183,11 +165,9 @@ def test_a_sweep_is_imported_beside_the_runs(tmp_path):
 
 
 def test_the_clock_may_have_started_before_the_flow(tmp_path):
-    trios(tmp_path / "melt.txt")
-    options = ("--column", "time=Time", "--start-time", 99, "--out", tmp_path / "data")
-    assert invoke(tmp_path / "melt.txt", *options).exit_code == 0
-    run = load_dataset(tmp_path / "data")["melt-2.csv"]
-    np.testing.assert_allclose(run.time, TIMES, atol=1e-13 * 99, rtol=0)
+    options = ("--column", "time=Time", "--start-time", 99)
+    out, _ = run(tmp_path, trios(tmp_path / "melt.txt"), *options)
+    np.testing.assert_allclose(load_dataset(out)[0].time, TIMES, atol=1e-13 * 99, rtol=0)
 
 
 BAD = {
@@ -216,12 +196,10 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_wrong_options_are_one_line_and_write_nothing(tmp_path, case):
     options, words = BAD[case]
-    trios(tmp_path / "melt.txt")
-    result = invoke(tmp_path / "melt.txt", "--out", tmp_path / "data", *options)
-    assert result.exit_code == 2, result.output
+    out, result = run(tmp_path, trios(tmp_path / "melt.txt"), *options, code=2)
     assert words in result.stderr
     assert result.stderr.strip().count("\n") == 0
-    assert not (tmp_path / "data" / "runs.csv").exists()
+    assert not (out / "runs.csv").exists()
 
 
 UNHELPED = {
@@ -236,9 +214,7 @@ UNHELPED = {
 def test_an_export_without_a_run_says_what_it_lacks_and_what_to_do(tmp_path, case):
     head, words = UNHELPED[case]
     rows = [f"{i}.5,{i + 1}.25,{i}.75" for i in range(12)]
-    (tmp_path / "a.csv").write_text("\n".join([head, *rows]))
-    result = invoke(tmp_path / "a.csv", "--out", tmp_path / "data")
-    assert result.exit_code == 2, result.output
+    _, result = imported(tmp_path, "a.csv", [head, *rows], code=2)
     assert words in result.stderr
     assert "a.csv" in result.stderr
 
@@ -248,15 +224,13 @@ def test_an_export_without_a_run_says_what_it_lacks_and_what_to_do(tmp_path, cas
 )
 def test_files_that_are_no_exports_are_refused(tmp_path, content):
     (tmp_path / "a.txt").write_bytes(content)
-    result = invoke(tmp_path / "a.txt", "--out", tmp_path / "data")
-    assert result.exit_code == 2, result.output
+    _, result = run(tmp_path, tmp_path / "a.txt", code=2)
     assert "a.txt" in result.stderr
 
 
 def test_a_comma_that_may_be_decimal_or_thousands_is_asked_for(tmp_path):
-    (tmp_path / "a.txt").write_text("time\tstress\ts\n1,234\t5,678\n2,345\t6,789\n")
-    result = invoke(tmp_path / "a.txt", "--out", tmp_path / "data")
-    assert result.exit_code == 2
+    rows = ["time\tstress\ts", "1,234\t5,678", "2,345\t6,789"]
+    _, result = imported(tmp_path, "a.txt", rows, code=2)
     assert "--decimal" in result.stderr
     (block,) = blocks_of_rows(read_rows(tmp_path / "a.txt", decimal=","))
     assert block.cells[0][:2] == ("1.234", "5.678")
@@ -293,11 +267,11 @@ def test_a_hundred_damaged_exports_are_imported_or_explained(tmp_path, writer):
 def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data, tmp_path):
     original = load_dataset(measured_data / "pi95k-startup")
     files = []
-    for run in original.runs[:4]:
+    for test in original.runs[:4]:
         rows = ["[step]", "Peak hold", "Step time\tShear rate\tStress\tN1", "min\t1/h\tkPa\tMPa"]
-        normal = run.first_normal_stress_difference / 1e6
-        rows += lines(run.time / 60, run.rate * 3600, run.stress / 1e3, normal)
-        files.append(tmp_path / run.name.replace(".csv", ".txt"))
+        normal = test.first_normal_stress_difference / 1e6
+        rows += lines(test.time / 60, test.rate * 3600, test.stress / 1e3, normal)
+        files.append(tmp_path / test.name.replace(".csv", ".txt"))
         files[-1].write_text("\n".join(rows).replace(".", ","), "utf-16")
     assert original.linear_sweep is not None
     sweep = original.linear_sweep
@@ -305,19 +279,13 @@ def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data,
     moduli = sweep.storage_modulus / 1e3, sweep.loss_modulus / 1e3
     rows += lines(sweep.angular_frequency / (2 * np.pi), *moduli)
     (tmp_path / "sweep.txt").write_text("\n".join(rows))
-    out = tmp_path / "data"
-    result = invoke(*files, tmp_path / "sweep.txt", "--out", out)
-    assert result.exit_code == 0, result.output
+    out, _ = run(tmp_path, *files, tmp_path / "sweep.txt")
     again = load_dataset(out)
-    for run in original.runs[:4]:
-        for name in ("time", "rate", "stress", "first_normal_stress_difference"):
-            wanted = getattr(run, name)
-            np.testing.assert_allclose(getattr(again[run.name], name), wanted, rtol=EXACT)
-    assert again.linear_sweep is not None
-    for name in ("angular_frequency", "storage_modulus", "loss_modulus"):
-        np.testing.assert_allclose(
-            getattr(again.linear_sweep, name), getattr(sweep, name), rtol=EXACT
-        )
+    sweeps = (again.linear_sweep, sweep, ("angular_frequency", "storage_modulus", "loss_modulus"))
+    columns = ("time", "rate", "stress", "first_normal_stress_difference")
+    for found, wanted, names in (sweeps, *((again[r.name], r, columns) for r in original.runs[:4])):
+        for name in names:
+            np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=EXACT)
 
 
 def test_a_folder_of_files_is_imported_as_all_of_them(tmp_path):
@@ -326,8 +294,9 @@ def test_a_folder_of_files_is_imported_as_all_of_them(tmp_path):
         rows = "\n".join(f"{t:g},{RATE:g},{x:g}" for t, x in zip(TIMES, STRESS, strict=True))
         (tmp_path / "mine" / name).write_text(f"time_s,shear_rate_1_s,stress_Pa\n{rows}\n")
     (tmp_path / "mine" / ".hidden.csv").write_text("")
-    refused = CliRunner().invoke(app, ["data", "check", str(tmp_path / "mine")])
-    assert "discover data import" in refused.output  # which is what to do with it
-    done = invoke(tmp_path / "mine", "--out", tmp_path / "out")
-    assert done.exit_code == 0, done.output
-    assert {run.name for run in load_dataset(tmp_path / "out")} == {"slow.csv", "fast.csv"}
+    with pytest.raises(
+        InputError, match=r"has no runs\.csv.*discover data import"
+    ):  # which is what to do with it
+        load_dataset(tmp_path / "mine")
+    out, _ = run(tmp_path, tmp_path / "mine")
+    assert set(load_dataset(out).names) == {"slow.csv", "fast.csv"}

@@ -46,6 +46,8 @@ def test_a_steady_start_without_its_rate_is_not_read_as_a_start_from_rest(tmp_pa
     data = load_dataset(made)
     assert data.names == ("a.csv",)
     assert "rate_before" in data.left_out
+    (said,) = (f.text for f in check_folder(made) if f.file == "b.csv" and f.subject == "runs")
+    assert "b.csv is set aside: it starts from a steady flow" in said
     with pytest.raises(InputError, match="rate_before"):
         data.select(["b.csv"])
     # where the study says from which rate, it is used
@@ -103,20 +105,6 @@ def test_a_start_in_steady_alternation_needs_a_cycle(tmp_path):
         load_dataset(folder(tmp_path / "melt", "file,start", "a.csv,periodic"))
 
 
-@pytest.mark.parametrize(
-    ("header", "cells", "word"),
-    [
-        ("file,step_strain", "300000", "1 for 100 %"),
-        ("file,step_strain,step_time_s", "1,-2", "from 0 on"),
-        ("file,step_strain,start", "1,periodic", "both a step of strain"),
-    ],
-)
-def test_what_cannot_have_been_done_is_refused(tmp_path, header, cells, word):
-    made = folder(tmp_path / "melt", header, f"a.csv,{cells}")
-    with pytest.raises(InputError, match=word):
-        load_dataset(made)
-
-
 def test_what_is_declared_as_it_is_taken_is_used(tmp_path):
     header = "file,flow,control,start,step_strain,temperature_C"
     made = folder(tmp_path / "melt", header, "a.csv,shear,rate,rest,,25", "b.csv,,,,,")
@@ -131,20 +119,22 @@ def test_a_rate_under_imposed_stress_counts_as_measured(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("header", "cell", "wanted"),
+    ("header", "cells", "words"),
     [
-        ("file,flow", "elongation", "shear, uniaxial, planar, biaxial"),
-        ("file,control", "torque", "rate, stress"),
-        ("file,start", "cold", "rest, periodic, steady"),
-        ("file,step_strain", "3 %", "Write a number"),
+        ("step_strain", "300000", ["1 for 100 %"]),
+        ("step_strain,step_time_s", "1,-2", ["from 0 on"]),
+        ("step_strain,start", "1,periodic", ["both a step of strain"]),
+        ("flow", "elongation", ["'elongation'", "shear, uniaxial, planar, biaxial"]),
+        ("control", "torque", ["'torque'", "rate, stress"]),
+        ("start", "cold", ["'cold'", "rest, periodic, steady"]),
+        ("step_strain", "3 %", ["'3 %'", "Write a number"]),
     ],
 )
-def test_an_unknown_value_is_said_with_those_that_are_known(tmp_path, header, cell, wanted):
-    made = folder(tmp_path / "melt", header, f"a.csv,{cell}")
-    with pytest.raises(InputError, match="line 2") as error:
+def test_what_cannot_have_been_done_is_refused_with_what_is_known(tmp_path, header, cells, words):
+    made = folder(tmp_path / "melt", f"file,{header}", f"a.csv,{cells}")
+    with pytest.raises(InputError, match=r"[Ll]ine 2") as error:
         load_dataset(made)
-    assert wanted in str(error.value)
-    assert repr(cell) in str(error.value)
+    assert all(word in str(error.value) for word in words)
 
 
 @pytest.mark.measured

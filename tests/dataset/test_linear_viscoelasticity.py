@@ -10,7 +10,7 @@ from discover.laws.multimode import Fluid
 
 
 def sweep_of(modulus, relaxation_time, frequency):
-    truth = RelaxationSpectrum(np.asarray(modulus), np.asarray(relaxation_time), 0.0, 0.0, {})
+    truth = RelaxationSpectrum(np.asarray(modulus), np.asarray(relaxation_time), 0.0, 0.0)
     return LinearSweep(frequency, *truth.moduli(frequency))
 
 
@@ -212,11 +212,7 @@ def test_a_solvent_that_is_declared_is_not_found_again():
 
 def test_the_number_of_modes_may_be_given_and_bounded():
     sweep = made(*MATERIALS["melt"], noise=0.01)
-    assert len(relaxation_spectrum(sweep, modes=2)) == 2
-    assert len(relaxation_spectrum(sweep, modes=4)) == 4
-    best = relaxation_spectrum(sweep, modes=2)
-    assert len(best) == 2
-    assert best.relative_error == pytest.approx(relaxation_spectrum(sweep).errors[2], rel=0.05)
+    assert [len(relaxation_spectrum(sweep, modes=count)) for count in (2, 4)] == [2, 4]
     with pytest.raises(InputError, match="modes must be from 1"):
         relaxation_spectrum(sweep, modes=0)
 

@@ -7,7 +7,6 @@ import pytest
 
 from discover.dataset import Dataset, Finding, Findings, LinearSweep, Run
 from discover.dataset.run_table import material_and_temperature, run_line
-from discover.errors import InputError
 from discover.protocols import start_up
 from discover.protocols.protocol import measured_rate
 
@@ -88,70 +87,35 @@ def titled(**metadata):
     return Run("r", pair, start_up(1.0), np.ones(2), np.ones(2), metadata=metadata)
 
 
+WARM = {"temperature_C": 20.0}
+
+
 @pytest.mark.parametrize(
-    ("rows", "words"),
+    ("rows", "otherwise", "words"),
     [
-        ([{}], ""),
-        ([{"temperature_C": 160.0}, {"temperature_C": 160.0}], "160 °C"),
-        ([{"sample": "LDPE", "temperature_C": 160.0}], "LDPE, 160 °C"),
-        (
-            [{"temperature_C_measured": -10.005}, {"temperature_C_measured": -23.01}],
-            "−23 and −10 °C",
-        ),
-        ([{"temperature_C": t} for t in (20.0, 40.0, 60.0)], "20 to 60 °C"),
-        ([{"material": "gel"}, {"material": "gel"}, {"material": "melt"}], "gel, melt"),
+        ([{}], "", ""),
+        ([WARM, WARM], "", "20 °C"),
+        ([{"sample": "LDPE", **WARM}], "", "LDPE, 20 °C"),
+        ([{"temperature_C_measured": t} for t in (-10.005, -23.01)], "", "−23 and −10 °C"),
+        ([{"temperature_C": t} for t in (20.0, 40.0, 60.0)], "", "20 to 60 °C"),
+        ([{"material": name} for name in ("gel", "gel", "melt")], "", "gel, melt"),
+        ([WARM], "melt-7", "melt-7, 20 °C"),
+        ([{"sample": "LDPE"}, WARM], "melt-7", "LDPE, 20 °C"),
+        ([*({"sample": name} for name in ("a1", "a2", "a3")), WARM], "melt-7", "melt-7, 20 °C"),
     ],
 )
-def test_titles_name_what_the_table_names_and_nothing_else(rows, words):
-    assert material_and_temperature([titled(**row) for row in rows]) == words
-
-
-@pytest.mark.parametrize(
-    ("samples", "words"),
-    [((), "melt-7, 20 °C"), (("LDPE",), "LDPE, 20 °C"), (("a1", "a2", "a3"), "melt-7, 20 °C")],
-)
-def test_the_name_of_the_data_stands_for_materials_that_nobody_told(samples, words):
-    runs = [titled(sample=one) for one in samples] + [titled(temperature_C=20.0)]
-    assert material_and_temperature(runs, otherwise="melt-7") == words
-
-
-def make_run(**changes):
-    time = np.array([0.0, 1.0, 2.0])
-    known = {"time": time, "protocol": start_up(1.0), "rate": np.ones(3), "stress": time}
-    return Run(**{"name": "a.csv", **known, **changes})
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"time": np.array([0.0, 2.0, 1.0])}, "increase strictly"),
-        ({"time": np.array([-1.0, 0.0, 1.0])}, "at or after 0"),
-        ({"stress": np.array([0.0, np.nan, 1.0])}, "sample 1 holds nan"),
-        ({"rate": np.ones(2)}, r"shape \(3,\)"),
-        ({"time": np.zeros(0)}, "no samples"),
-        ({"clock_factor": 0.0}, "clock factor"),
-    ],
-)
-def test_a_bad_run_is_refused_with_what_is_wrong(changes, message):
-    with pytest.raises(InputError, match=message):
-        make_run(**changes)
+def test_titles_name_what_the_table_names_or_the_data_where_it_names_none_or_many(
+    rows, otherwise, words
+):
+    runs = [titled(**row) for row in rows]
+    assert material_and_temperature(runs, otherwise=otherwise) == words
 
 
 def test_a_window_cuts_samples_and_keeps_the_flow():
-    run = make_run(first_normal_stress_difference=np.array([0.0, 2.0, 4.0]))
+    time = np.array([0.0, 1.0, 2.0])
+    run = Run("a.csv", time, start_up(1.0), np.ones(3), time, 2.0 * time)
     cut = run.window(run.time > 0.5)
     assert len(cut) == 2
     assert cut.protocol is run.protocol
     assert cut.first_normal_stress_difference is not None
     np.testing.assert_array_equal(cut.first_normal_stress_difference, [2.0, 4.0])
-
-
-def test_selecting_an_unknown_run_names_those_there_are():
-    data = Dataset("set", (make_run(),))
-    with pytest.raises(InputError, match=r"no run 'b\.csv'\. Write a\.csv"):
-        data.select(["b.csv"])
-
-
-def test_a_repeated_name_is_refused():
-    with pytest.raises(InputError, match="twice"):
-        Dataset("set", (make_run(), make_run()))

@@ -5,14 +5,15 @@ Data: scipy's integration of a Giesekus fluid, and closed forms of a Maxwell flu
 
 import numpy as np
 import pytest
+from independent import Giesekus, of_rate, start_up
+from independent import oscillation as wave
 from made_exports import LAMBDA as TIME
 from made_exports import G as MODULUS
 from made_exports import sweep_table, write_runs
-from scipy.integrate import solve_ivp
 
 from discover.dataset import check_folder
 
-MOBILITY, OMEGA = 0.3, 1.5
+OMEGA = 1.5
 
 
 def write(folder, *runs, linear=True):
@@ -23,22 +24,13 @@ def about(folder, subject):
     return [str(finding) for finding in check_folder(folder) if finding.subject == subject]
 
 
-def giesekus(times, rate, start=(0.0, 0.0, 0.0), solvent=0.0, noise=0.01):
+def giesekus(times, flow, solvent=0.0, noise=0.01):
     """Stresses of a Giesekus fluid in shear, by scipy."""
-
-    def slope(t, s):
-        s11, s22, s12 = s
-        g = rate(t)
-        square = (s11**2 + s12**2, s22**2 + s12**2, s12 * (s11 + s22))
-        relaxed = (-s - MOBILITY / MODULUS * np.array(square)) / TIME
-        return relaxed + np.array([2 * g * s12, 0.0, g * s22 + MODULUS * g])
-
-    made = solve_ivp(slope, (0, times[-1]), start, t_eval=times, rtol=1e-8, atol=1e-8)
-    rates = np.array([rate(t) for t in times])
-    stress = made.y[2] + solvent * rates
+    stress = Giesekus(0.3, MODULUS, TIME).respond(flow, times).sigma12
+    stress = stress + solvent * flow.rate(times)
     spread = noise * np.max(np.abs(stress))
     stress = stress + spread * np.random.default_rng(7).standard_normal(len(times))
-    return {"time_s": times, "shear_rate_1_s": rates, "stress_Pa": stress}
+    return {"time_s": times, "shear_rate_1_s": flow.rate(times), "stress_Pa": stress}
 
 
 CYCLES = np.linspace(0.0, 16.0, 400)
@@ -59,7 +51,7 @@ def test_relaxation_after_a_step_of_strain_is_no_run_from_rest(tmp_path):
 
 
 def test_an_oscillation_that_had_gone_on_for_ever_is_no_run_from_rest(tmp_path):
-    late = giesekus(CYCLES + 32 * np.pi / OMEGA, lambda t: 2.0 * np.cos(OMEGA * t))
+    late = giesekus(CYCLES + 32 * np.pi / OMEGA, wave(2.0, OMEGA))
     late["time_s"] = CYCLES
     (said,) = about(write(tmp_path, late, linear=False), "start")
     assert "periodic steady state" in said
@@ -80,13 +72,13 @@ def test_a_flow_at_its_steady_stress_from_the_first_sample_is_no_run_from_rest(t
 @pytest.mark.parametrize("solvent", [0.0, 60.0])
 @pytest.mark.parametrize("phase", [0.0, 0.8, 1.5])
 def test_nothing_is_said_of_an_oscillation_from_rest(tmp_path, phase, solvent):
-    run = giesekus(CYCLES, lambda t: 2.0 * np.cos(OMEGA * t + phase), solvent=solvent)
+    run = giesekus(CYCLES, wave(2.0, OMEGA, phase), solvent=solvent)
     assert about(write(tmp_path, run, linear=False), "start") == []
 
 
 def test_nothing_is_said_of_start_ups_from_rest(tmp_path):
-    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.05, 0.3, 2.0)]
-    runs.append(giesekus(START_UP, lambda t: 1.0, solvent=100.0))
+    runs = [giesekus(START_UP, start_up(r)) for r in (0.05, 0.3, 2.0)]
+    runs.append(giesekus(START_UP, start_up(1.0), solvent=100.0))
     assert about(write(tmp_path, *runs, linear=False), "start") == []
     assert about(write(tmp_path, *runs[:3]), "start") == []
 
@@ -100,7 +92,7 @@ def test_nothing_is_said_of_a_rate_that_falls_and_takes_the_stress_along(tmp_pat
 
 @pytest.mark.parametrize("late", [2.0, 4.0, 20.0])
 def test_a_start_up_whose_rise_was_not_recorded_does_not_show_a_start_from_rest(tmp_path, late):
-    run = giesekus(START_UP[1:] + late, lambda t: 0.3)
+    run = giesekus(START_UP[1:] + late, start_up(0.3))
     run["time_s"] = START_UP[1:]
     (said,) = about(write(tmp_path, run, linear=False), "start")
     assert "does not show it: its first stress, at 0.01 s, is" in said
@@ -108,7 +100,7 @@ def test_a_start_up_whose_rise_was_not_recorded_does_not_show_a_start_from_rest(
 
 
 def test_an_oscillation_sampled_too_late_does_not_show_a_start_from_rest(tmp_path):
-    run = giesekus(CYCLES, lambda t: 8.0 * np.cos(OMEGA * t))
+    run = giesekus(CYCLES, wave(8.0, OMEGA))
     run = {name: values[9:] for name, values in run.items()}
     (said,) = about(write(tmp_path, run, linear=False), "start")
     assert "nothing before it was recorded" in said
@@ -116,13 +108,13 @@ def test_an_oscillation_sampled_too_late_does_not_show_a_start_from_rest(tmp_pat
 
 @pytest.mark.parametrize("rate", [0.05, 0.3, 2.0])
 def test_the_same_records_with_their_rise_are_not_doubted(tmp_path, rate):
-    runs = [giesekus(START_UP[1:], lambda t: rate), giesekus(START_UP[20:], lambda t: rate)]
+    runs = [giesekus(START_UP[1:], start_up(rate)), giesekus(START_UP[20:], start_up(rate))]
     assert about(write(tmp_path, *runs, linear=False), "start") == []
 
 
 @pytest.mark.parametrize("gain", [0.88, 1.15])
 def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
-    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
+    runs = [giesekus(START_UP, start_up(r)) for r in (0.02, 0.06, 0.2, 0.5)]
     for run in runs:
         run["stress_Pa"] = gain * run["stress_Pa"]
     (said,) = about(write(tmp_path, *runs), "gain")
@@ -132,8 +124,8 @@ def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
 
 
 def oscillation(amplitude, gain=1.0, cosine=True):
-    wave = np.cos if cosine else np.sin
-    run = giesekus(CYCLES, lambda t: amplitude * OMEGA * wave(OMEGA * t), noise=0.02)
+    flow = wave(amplitude * OMEGA, OMEGA, 0.0 if cosine else -0.5 * np.pi)
+    run = giesekus(CYCLES, flow, noise=0.02)
     return {**run, "stress_Pa": gain * run["stress_Pa"]}
 
 
@@ -158,14 +150,14 @@ def test_no_gain_is_said_of_oscillations_that_agree_or_are_nonlinear(tmp_path, a
 
 def test_no_gain_is_said_of_an_oscillation_that_lags_its_rate(tmp_path):
     run = oscillation(0.05)
-    late = giesekus(CYCLES, lambda t: 0.05 * OMEGA * np.cos(OMEGA * t - 0.5))
+    late = giesekus(CYCLES, wave(0.05 * OMEGA, OMEGA, -0.5))
     assert about(write(tmp_path, {**run, "stress_Pa": late["stress_Pa"]}), "gain") == []
 
 
 def start_ups(rates, gain=1.0, noise=0.01):
     """Start-ups whose noise is a share of the stress."""
     generator = np.random.default_rng(3)
-    runs = [giesekus(START_UP, lambda t, r=r: r, noise=0.0) for r in rates]
+    runs = [giesekus(START_UP, start_up(r), noise=0.0) for r in rates]
     for run in runs:
         spread = noise * generator.standard_normal(len(START_UP))
         run["stress_Pa"] = gain * run["stress_Pa"] * (1 + spread)
@@ -182,7 +174,7 @@ def test_one_start_up_or_two_tell_a_gain_that_is_clear_of_their_scatter(tmp_path
 
 @pytest.mark.parametrize("rate", [0.02, 0.2, 2.0, 20.0])
 def test_no_gain_is_said_of_one_noisy_start_up_that_agrees(tmp_path, rate):
-    run = giesekus(START_UP, lambda t: rate, noise=0.02)
+    run = giesekus(START_UP, start_up(rate), noise=0.02)
     assert about(write(tmp_path, run), "gain") == []
 
 
@@ -195,7 +187,7 @@ def test_a_small_gain_that_three_runs_share_is_noted_and_not_doubted(tmp_path):
 
 
 def test_no_gain_is_said_of_runs_that_agree_with_the_sweep(tmp_path):
-    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
+    runs = [giesekus(START_UP, start_up(r)) for r in (0.02, 0.06, 0.2, 0.5)]
     assert about(write(tmp_path, *runs), "gain") == []
 
 
@@ -217,13 +209,13 @@ def test_no_gain_is_said_of_runs_that_start_slowly(tmp_path):
     """A rate that rises within 1 s lowers the early stress, less and less."""
     runs = []
     for rate in (0.1, 0.2, 0.5):
-        run = giesekus(START_UP, lambda t, r=rate: r * -np.expm1(-t / 1.0))
+        run = giesekus(START_UP, of_rate(lambda t, r=rate: r * -np.expm1(-t / 1.0), 20.0))
         runs.append({**run, "shear_rate_1_s": np.full(len(START_UP), rate)})
     assert about(write(tmp_path, *runs), "gain") == []
 
 
 def test_no_gain_is_said_of_runs_that_disagree_each_in_its_way(tmp_path):
-    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
+    runs = [giesekus(START_UP, start_up(r)) for r in (0.02, 0.06, 0.2, 0.5)]
     for run, gain in zip(runs, (0.85, 1.12, 0.9, 1.2), strict=True):
         run["stress_Pa"] = gain * run["stress_Pa"]
     assert about(write(tmp_path, *runs), "gain") == []

@@ -125,7 +125,7 @@ def test_a_rate_before_is_read_in_the_unit_that_its_heading_names(tmp_path, colu
 def test_a_rate_before_in_another_quantitys_unit_is_refused(tmp_path):
     folder = write(tmp_path, f"time_s,shear_rate_1_s,stress_Pa\n{ROWS}")
     (folder / "runs.csv").write_text("file,rate_before_Pa\na.csv,3\n")
-    words = r"rate_before_Pa has the unit Pa, .* End its name with one of 1/s"
+    words = r"rate_before_Pa has the unit Pa, .* Name the column rate_before_1_s"
     with pytest.raises(InputError, match=words):
         load_dataset(folder, rate_before="rate_before_Pa")
     assert any("has the unit Pa" in str(f) for f in check_folder(folder).of("warning"))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from discover.dataset import Dataset, LinearSweep
-from discover.errors import InputError
 from discover.study import parse_study
 from discover.study.declared_model import declared_model
 
@@ -62,23 +61,3 @@ def test_a_solid_is_a_mode_that_does_not_relax_and_is_named():
         by_hand = declared("elastic_modulus_Pa = 40.0")
     assert by_hand.relaxation_time[-1] >= 1000.0
     assert "solid" in by_hand.modes_in_words
-
-
-@pytest.mark.parametrize(
-    ("lines", "said"),
-    [
-        (["modulus_Pa = [1, 2]", "relaxation_time_s = [1.0]"], "as many values"),
-        (["modulus_Pa = [1, 2]"], "as many values"),
-        (['modes = "lve"', "modulus_Pa = [1]", "relaxation_time_s = [1]"], "leave one of them out"),
-        (["modes = 0"], "modes"),
-        (["modes = true"], "modes"),
-        (["modes = 2.5"], "modes"),
-        (['elastic_modulus_Pa = "fit"'], "modes"),
-        (["solvent_viscosity_Pa_s = -1"], "solvent_viscosity_Pa_s"),
-        (["modulus_Pa = []", "relaxation_time_s = []"], "modulus_Pa"),
-        (["modes = 40"], "modes"),
-    ],
-)
-def test_modes_that_cannot_be_are_refused_by_name(lines, said):
-    with pytest.raises(InputError, match=said):
-        declared(*lines)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_exports import csv, write_runs
 
 from discover.errors import InputError, problems_in
 from discover.laws import make_law
@@ -14,17 +15,14 @@ from discover.study.declared_model import declared_model
 SYNTHETIC = {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 20}}
 
 
-def make_folder(path, n_runs=2):
-    path.mkdir()
-    rows = ["file"]
-    for i in range(n_runs):
-        t = np.linspace(0.0, 2.0, 15)
-        lines = ["time_s,shear_rate_1_s,stress_Pa"]
-        lines += [f"{a},{1.0 + i},{b}" for a, b in zip(t, 1 - np.exp(-t), strict=True)]
-        (path / f"r{i}.csv").write_text("\n".join(lines))
-        rows.append(f"r{i}.csv")
-    (path / "runs.csv").write_text("\n".join(rows))
-    return path
+TIMES = np.linspace(0.0, 2.0, 15)
+
+
+def make_folder(path, **more):
+    table = {"time_s": TIMES, "stress_Pa": 1 - np.exp(-TIMES)}
+    return write_runs(
+        path, *(table | {"shear_rate_1_s": rate + 0 * TIMES} for rate in (1, 2)), **more
+    )
 
 
 def test_the_contract_example_is_accepted(tmp_path):
@@ -56,6 +54,17 @@ test = "paper"
     assert study.name == "s"
 
 
+MODES_THAT_CANNOT_BE = (
+    ({"modulus_Pa": [1, 2], "relaxation_time_s": [1.0]}, "as many values"),
+    ({"modulus_Pa": [1, 2]}, "as many values"),
+    ({"modes": "lve", "modulus_Pa": [1], "relaxation_time_s": [1]}, "leave one of them out"),
+    *(({"modes": wrong}, "modes") for wrong in (0, True, 2.5, 40)),
+    ({"elastic_modulus_Pa": "fit"}, "modes"),
+    ({"solvent_viscosity_Pa_s": -1}, "solvent_viscosity_Pa_s"),
+    ({"modulus_Pa": [], "relaxation_time_s": []}, "modulus_Pa"),
+)
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -75,6 +84,10 @@ test = "paper"
         ({"data": SYNTHETIC, "model": {"sweep_rad_s": [1, 2]}}, ["sweep_rad_s", "lve"]),
         ({"data": SYNTHETIC, "model": {"modes": "lve", "sweep_rad_s": [2, 1]}}, ["[low, high]"]),
         ({"data": {"synthetic": {"law": "ucm", "noise": float("nan")}}}, ["noise"]),
+        ({"data": {"synthetic": {"law": "ucm", "noise": True}}}, ["should be a number; got true"]),
+        ({"data": {"folder": "a", "fit": []}}, ["leave it out to fit all"]),
+        ({"data": SYNTHETIC, "loop": {"effects": []}}, ["max_effects = 0"]),
+        *(({"data": SYNTHETIC, "model": model}, [word]) for model, word in MODES_THAT_CANNOT_BE),
     ],
 )
 def test_a_wrong_study_is_one_error_that_names_the_key(content, words):
@@ -145,7 +158,7 @@ def test_the_fingerprint_changes_with_study_seed_and_data(tmp_path):
     assert first == fingerprint(read_study(file), 1)
     assert first != fingerprint(read_study(file), 2)
     with (tmp_path / "runs" / "r0.csv").open("a") as stream:
-        stream.write("\n3.0,1.0,0.99")
+        stream.write("\n3.0,0.99,1.0")
     assert first != fingerprint(read_study(file), 1)
 
 
@@ -185,14 +198,9 @@ def test_a_file_in_place_of_the_result_folder_is_an_input_error(tmp_path):
 
 
 def with_an_extension(path):
-    made = make_folder(path)
-    index = (made / "runs.csv").read_text().splitlines()
-    (made / "runs.csv").write_text("\n".join([f"{index[0]},flow", *(f"{n}," for n in index[1:])]))
-    with (made / "runs.csv").open("a") as file:
-        file.write("\npull.csv,uniaxial\n")
-    rows = [f"{t},0.5,{t}" for t in np.linspace(0.1, 2.0, 15)]
-    (made / "pull.csv").write_text("\n".join(["time_s,hencky_rate_1_s,tensile_stress_Pa", *rows]))
-    return made
+    table = {"time_s": TIMES + 0.1, "hencky_rate_1_s": 0.5 + 0 * TIMES, "tensile_stress_Pa": TIMES}
+    index = "file,flow\nr0.csv,\nr1.csv,\npull.csv,uniaxial\n"
+    return make_folder(path, runs__csv=index, pull__csv=csv(table))
 
 
 def test_a_stress_that_is_not_observed_judges(tmp_path):

@@ -15,7 +15,7 @@ from discover.dataset.checking import runs as run_checks
 from discover.dataset.checking.runs import Finding, Findings, Severity, found
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import SWEEP_FILE, read_index
-from discover.dataset.read_run import INDEX_FILE, read_run, reason_to_set_aside, table_of_run
+from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units
@@ -35,18 +35,11 @@ _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_sh
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
 
-def check_folder(
-    folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None
-) -> Findings:
+def check_folder(folder: str | Path, clock_factor: str | None = None) -> Findings:
     """Return what is wrong, doubtful or worth knowing about a data folder; errors come first.
 
     Nothing is simulated: a run is compared with itself, with what a passive fluid at rest can do,
-    and with linear viscoelasticity.
-
-    Parameters
-    ----------
-    folder, clock_factor, base
-        As in `discover.dataset.load.load_dataset`.
+    and with linear viscoelasticity. `folder`, `clock_factor`: as in `load_dataset`.
 
     Examples
     --------
@@ -55,7 +48,7 @@ def check_folder(
     findings: list[Finding] = []
     place = "folder", ""
     try:
-        root = load.resolve_folder(folder, base)
+        root = load.resolve_folder(folder, None)
         place = "runs", INDEX_FILE
         index = read_index(root)
         findings += [*_clock(index, clock_factor), *_before(index)]
@@ -67,12 +60,12 @@ def check_folder(
     runs: list[Run] = []
     for row, name in enumerate(names):
         try:
-            if (reason := reason_to_set_aside(index, row, rate_before=True)) is not None:
-                findings.append(found("set_aside", name, why=reason))
-                continue
             table = table_of_run(root, name)
             rate = None if before is None else float(before[row])
             runs.append(read_run(table, index, row, rate_before=rate))
+        except SetAside as why:
+            findings.append(found("set_aside", name, why=why))
+            continue
         except InputError as wrong:
             findings += _errors("run", name, wrong)
             continue

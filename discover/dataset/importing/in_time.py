@@ -81,9 +81,8 @@ class Course:
 
     @property
     def follows_stress(self) -> bool:
-        """Whether the stress is a smooth ramp and the rate is not."""
-        ramp = straight(self.time, self.stress)
-        return (ramp or _rougher(self.time, self.moved, self.stress)) and not self.rate_is_set
+        """Whether the stress is a ramp, and neither rate nor strain goes straight."""
+        return straight(self.time, self.stress) and not self.rate_is_set
 
     @property
     def goes_on(self) -> bool:
@@ -176,7 +175,7 @@ def _by_numbers(course: Course) -> tuple[TestName, str]:
         return "flow_curve", f"every row has another rate, {span}"
     if ways is not None and not ways.apart:
         return "flow_curve", "the rate goes up and down in steps, and the stress is the same"
-    if straight(course.time, stress) and course.follows_stress:
+    if course.follows_stress:
         return "creep", "a ramp of stress, which the strain follows"
     if strain is not None and not by_rate:
         # held: what is left of the rise of the strain lies before the middle of the record
@@ -295,16 +294,6 @@ def strain_of(time: Values, rate: Values) -> Values:
         return np.full(len(time), before)
     made = PchipInterpolator(time, rate).antiderivative()(time)
     return before + made - made[0]
-
-
-def _rougher(time: Values, answer: Values, imposed: Values) -> bool:
-    """Return whether one record is rougher than another by a factor of ten."""
-
-    def roughness(values):
-        middle = np.interp(time[1:-1], time[::2], values[::2])
-        return np.median(np.abs(values[1:-1] - middle)) / (np.ptp(values) or 1.0)
-
-    return bool(roughness(answer) > 10.0 * roughness(imposed))
 
 
 def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) -> list[Numbered]:

@@ -10,6 +10,7 @@ import unicodedata
 from functools import cache
 from importlib.resources import files
 from itertools import pairwise
+from typing import Any
 
 # tables of names.toml that name one quantity, the better first
 _PARTS = {"time": ("step_time", "time"), "omega": ("omega", "frequency")}
@@ -68,59 +69,55 @@ def plain(name: str) -> str:
     return "".join(word.rstrip(".") for word in words_of(name))
 
 
-class NameTable:
-    """Names of quantities."""
+@cache
+def _places() -> tuple[dict[str, dict[str, int]], dict[tuple[int, str], list[Any]]]:
+    """Return the place of each plain name in its table; tables and words by number and initial."""
+    places: dict[str, dict[str, int]] = {}
+    words_like: dict[tuple[int, str], list[Any]] = {}
+    for section, names in shipped_names().items():
+        ranks = places.setdefault(section, {})
+        for one in (one for name in names for one in (name, name.translate(_UMLAUTS))):
+            words = tuple(word.rstrip(".") for word in words_of(one))
+            ranks.setdefault("".join(words), len(ranks))
+            words_like.setdefault((len(words), words[0][0]), []).append((section, words))
+    return places, words_like
 
-    def __init__(self):
-        self._rank: dict[str, dict[str, int]] = {}
-        self._words: dict[tuple[int, str], list[tuple[str, tuple[str, ...]]]] = {}
-        for section, names in shipped_names().items():
-            ranks = self._rank.setdefault(section, {})
-            for name in names:
-                for one in dict.fromkeys((name, name.translate(_UMLAUTS))):
-                    words = tuple(word.rstrip(".") for word in words_of(one))
-                    ranks.setdefault("".join(words), len(ranks))
-                    alike = self._words.setdefault((len(words), words[0][0]), [])
-                    alike.append((section, words))
-        self._found: dict[str, dict[str, int]] = {}
 
-    def rank(self, key: str, name: str) -> int | None:
-        """Return how good a name of a quantity this is, 0 the best; None if it is none."""
-        ranks, before = self.find(name), 0
-        for section in _PARTS.get(key, (key,)):
-            if section in ranks:
-                return before + ranks[section]
-            before += len(self._rank.get(section, ()))
-        return None
+def rank_of(key: str, name: str) -> int | None:
+    """Return how good a name of a quantity this is, 0 the best; None if it is none."""
+    ranks, before = tables_of(name), 0
+    for section in _PARTS.get(key, (key,)):
+        if section in ranks:
+            return before + ranks[section]
+        before += len(_places()[0].get(section, ()))
+    return None
 
-    def find(self, name: str) -> dict[str, int]:
-        """Return the tables in which a name stands, and its place there."""
-        if name not in self._found:
-            self._found[name] = self._find(words_of(name))
-        return self._found[name]
 
-    def _find(self, words: tuple[str, ...]) -> dict[str, int]:
-        bare = [word.rstrip(".") for word in words]
+@cache
+def tables_of(name: str) -> dict[str, int]:
+    """Return the tables in which a name stands, and its place there."""
+    (places, words_like), words = _places(), words_of(name)
+    bare = [word.rstrip(".") for word in words]
 
-        def exact(parts: list[str]) -> dict[str, int]:
-            name = "".join(parts)
-            return {key: ranks[name] for key, ranks in self._rank.items() if name in ranks}
+    def exact(parts: list[str]) -> dict[str, int]:
+        plain = "".join(parts)
+        return {key: ranks[plain] for key, ranks in places.items() if plain in ranks}
 
-        if known := exact(bare):
-            return known
-        for i in range(1, len(bare)):  # a name and its symbol
-            first, second = exact(bare[:i]), exact(bare[i:])
-            if both := {key: min(first[key], second[key]) for key in first if key in second}:
-                return both
-        cut: dict[str, str] = {}
-        # a word alone is no shorter form of a compound: Interval is not Intervallzeit
-        alone = not words or (len(words) == 1 and not words[0].endswith("."))
-        for section, whole in () if alone else self._words.get((len(words), words[0][0]), ()):
-            if all(map(_stands_for, words, whole)):
-                cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
-        least = min(map(len, cut.values()), default=0)
-        best = {key: self._rank[key][name] for key, name in cut.items() if len(name) == least}
-        return best if len(best) == 1 else {}  # Shear str. may be either
+    if known := exact(bare):
+        return known
+    for i in range(1, len(bare)):  # a name and its symbol
+        first, second = exact(bare[:i]), exact(bare[i:])
+        if both := {key: min(first[key], second[key]) for key in first if key in second}:
+            return both
+    cut: dict[str, str] = {}
+    # a word alone is no shorter form of a compound: Interval is not Intervallzeit
+    alone = not words or (len(words) == 1 and not words[0].endswith("."))
+    for section, whole in () if alone else words_like.get((len(words), words[0][0]), ()):
+        if all(map(_stands_for, words, whole)):
+            cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
+    least = min(map(len, cut.values()), default=0)
+    best = {key: places[key][plain] for key, plain in cut.items() if len(plain) == least}
+    return best if len(best) == 1 else {}  # Shear str. may be either
 
 
 def _stands_for(word: str, whole: str) -> bool:
@@ -147,20 +144,17 @@ def alternatives(table: str) -> dict[str, str]:
     return {key: "|".join(words) for key, words in content[table].items()}
 
 
-name_table = cache(NameTable)
-
-
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250", "utf-8")
 
 
 def code_page_of(content: bytes) -> str:
     """Code page, or damaged UTF-8, of a text: the encoding in which most names are known."""
-    sample, table = content[:20_000], name_table()
+    sample = content[:20_000]
 
     def known(encoding: str) -> int:
         text = sample.decode(encoding, "replace")
         cells = set(re.split(r"[\t;,\r\n]|[\[(].*?[\])]", text))
         names = (cell for cell in cells if len(cell) < 80 and any(c.isalpha() for c in cell))
-        return sum(bool(table.find(name)) for name in names)
+        return sum(bool(tables_of(name)) for name in names)
 
     return max(_CODE_PAGES, key=known)

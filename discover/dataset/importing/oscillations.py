@@ -2,10 +2,10 @@
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import fminbound
 
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import Block
+from discover.dataset.run_table import wave_of
 
 Values = Float[np.ndarray, " n"]
 
@@ -34,54 +34,33 @@ def alternates(values: Values) -> bool:
     return turns >= 1 and turns < 0.25 * len(signs) and float(np.mean(outer)) > 0.5
 
 
-def frequency_of(time: Values, values: Values) -> float:
-    """Return the angular frequency in rad/s at which a sine with an offset fits best."""
-    span = float(time[-1] - time[0])
-    centred = values - np.mean(values)
-    turns = np.flatnonzero(np.sign(centred[1:]) != np.sign(centred[:-1]))
-    guess = np.pi * max(len(turns), 1) / span
-
-    def misfit(omega: float) -> float:
-        return float(np.sum((values - _series(time, values, omega, 1)[0]) ** 2))
-
-    # between its turns and beyond them lies up to one more half cycle
-    most = max(1.6, 1.1 + 1.0 / max(len(turns), 1))
-    trials = guess * np.arange(0.5, most, 0.01)
-    best = trials[int(np.argmin([misfit(omega) for omega in trials]))]
-    step = 0.01 * guess
-    return np.asarray(fminbound(misfit, best - step, best + step, xtol=1e-9 * best)).item()
-
-
-def _series(
-    time: Values, values: Values, omega: float, most: int
-) -> tuple[Values, Float[np.ndarray, " most"]]:
-    """Return the Fourier series that fits a record best, and the amplitudes of its harmonics."""
-    phases = omega * time[:, None] * np.arange(1, most + 1)
-    design = np.concatenate([np.ones((len(time), 1)), np.cos(phases), np.sin(phases)], axis=1)
+def _harmonics(time: Values, values: Values, omega: float) -> Float[np.ndarray, " harmonics"]:
+    """Return the amplitudes of the Fourier series that fits a record best."""
+    phases = omega * time[:, None] * np.arange(1, _HARMONICS + 1)
+    design = np.concatenate([np.cos(phases), np.sin(phases), np.ones((len(time), 1))], axis=1)
     found, *_ = np.linalg.lstsq(design, values, rcond=None)
-    return design @ found, np.hypot(found[1 : most + 1], found[most + 1 :])
+    return np.hypot(found[:_HARMONICS], found[_HARMONICS:-1])
 
 
 def purer(time: Values, stress: Values, strain: Values) -> bool:
     """Return whether the stress is a sine and the strain is not, so that the stress was imposed."""
-    if np.any(np.diff(time) <= 0.0):
-        return False
-    omega = frequency_of(time, stress)
-    if (time[-1] - time[0]) * omega < 2.0 * np.pi * 0.99:
-        return False  # less than a cycle
+    wave = wave_of(time, stress - np.mean(stress)) if np.all(np.diff(time) > 0.0) else None
+    if wave is None or (time[-1] - time[0]) * wave[0] < 2.0 * np.pi * 0.99:
+        return False  # no wave, or less than a cycle
     impure = []
     for values in (stress, strain):
-        _, sizes = _series(time, values, omega, _HARMONICS)
+        sizes = _harmonics(time, values, wave[0])
         impure.append(float(np.sqrt(np.sum(sizes[1:] ** 2)) / sizes[0]))
     return impure[0] < _SINE and impure[1] > 4.0 * impure[0] and impure[1] > 2.0 * _SINE
 
 
 def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
     """Whether strain and stress, in either role, begin in steady alternation, not from rest."""
-    period = 2.0 * np.pi / frequency_of(time, imposed)
-    size = float(np.max(np.abs(answer)))
-    step = float(np.median(np.diff(time)))
-    if time[-1] - time[0] + step < period * (1.0 - _WHOLE) or size == 0.0:
+    wave, size = wave_of(time, imposed - np.mean(imposed)), float(np.max(np.abs(answer)))
+    if wave is None or size == 0.0:
+        return False
+    period, step = 2.0 * np.pi / wave[0], float(np.median(np.diff(time)))
+    if time[-1] - time[0] + step < period * (1.0 - _WHOLE):
         return False
     if time[0] < _AT_ONCE * period and abs(answer[0]) > _FAR * size:
         return True

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.importing.names import name_table, plain
+from discover.dataset.importing.names import plain, rank_of, tables_of
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_clock
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
@@ -82,7 +82,7 @@ def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
 
 def name_rank(key: str, name: str, unit: str) -> int | None:
     """Return how good a column is for a quantity, 0 the best; None if it is not called so."""
-    rank = name_table().rank(key, name)
+    rank = rank_of(key, name)
     if rank is not None:
         return rank if fits(key, name, unit) else None
     if name == QUANTITIES[key].column:
@@ -95,7 +95,7 @@ def split_name(key: str, name: str) -> tuple[int, str] | None:
     """Return the rank of a name that ends in a unit of the quantity, and it: ``stress_kPa``."""
     for mark in re.finditer(r"[\s_/,;]+", name):
         head, tail = name[: mark.start()], name[mark.end() :]
-        rank = 0 if head == QUANTITIES[key].stem else name_table().rank(key, head)
+        rank = 0 if head == QUANTITIES[key].stem else rank_of(key, head)
         if rank is None or not re.search(r"[^\W\d_]|%", tail):
             continue
         # this project's own 1_s and rad_s, and Pa_s
@@ -189,7 +189,7 @@ def unsaid_unit(key: str, column: str, raw: Values, get: Get) -> UnsaidUnit:
     angular frequency is one in rad/s, a frequency may count.
     """
     choices = _CHOICES.get(key)
-    if choices is None or (key == "omega" and "frequency" not in name_table().find(column)):
+    if choices is None or (key == "omega" and "frequency" not in tables_of(column)):
         return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")
     if (told := _told(key, raw, get)) is not None:
         return UnsaidUnit(column, told[0], "told", told[1])

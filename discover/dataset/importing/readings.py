@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from discover.dataset.importing import quantities
 from discover.dataset.importing.mapping import Geometry, Mapping
-from discover.dataset.importing.names import name_table
+from discover.dataset.importing.names import rank_of
 from discover.dataset.importing.quantities import QUANTITIES, UnsaidUnit, name_rank, to_celsius
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import Constant, is_clock, seconds, temperature_in
@@ -165,7 +165,7 @@ class Readings:
             return np.where(wrong, math.nan, degrees)
         if not unit:
             lines = (c for c in self.block.constants if not c.value)
-            said = (c.unit for c in lines if name_table().rank(key, c.name) is not None)
+            said = (c.unit for c in lines if rank_of(key, c.name) is not None)
             unit = next(said, "") or self._unsaid(key, column, raw)
         factor = quantities.factor_to_si(key, unit, column, self.name)
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")

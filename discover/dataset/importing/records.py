@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from discover.dataset.importing.in_time import AT_REST, CONSTANT, spread, strain_of, up_and_down
 from discover.dataset.importing.mapping import TestName
-from discover.dataset.importing.names import name_table
+from discover.dataset.importing.names import tables_of
 from discover.dataset.importing.oscillations import alternates, goes_on
 from discover.dataset.importing.quantities import QUANTITIES, SAME_TEMPERATURE
 from discover.dataset.importing.readings import Readings
@@ -263,7 +263,7 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
     if not len(time):
         return 0.0, last
     name, _ = readings.block.columns[readings.columns["time"]]
-    goes_on = "step_time" not in name_table().find(name) and 0.0 < last <= time[0]
+    goes_on = "step_time" not in tables_of(name) and 0.0 < last <= time[0]
     return last if goes_on else 0.0, float(time[-1])
 
 

@@ -239,6 +239,25 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     return Table(name, columns, lines)
 
 
+def table_in(root: Path, name: str) -> Table | None:
+    """Return a table of a folder; None if it is not there, InputError if a link leads outside."""
+    if not os.path.lexists(root / name):
+        return None
+    if not is_inside(root, name):
+        raise InputError(
+            f"{name} is a link to outside the folder. Put the file itself in the folder."
+        )
+    return read_table(root / name)
+
+
+def is_inside(root: Path, name: str) -> bool:
+    """Return whether a file lies in a folder, by its name and where links lead."""
+    try:
+        return (root / name).resolve().is_relative_to(root.resolve())
+    except (OSError, RuntimeError, ValueError):  # too long, or a link to itself
+        return False
+
+
 def _decode(content: bytes, name: str) -> str:
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise InputError(

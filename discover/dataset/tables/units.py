@@ -219,21 +219,11 @@ def factor_to(unit: Unit, quantity: Quantity) -> float | None:
 
 def heading_factor(column: str, quantity: Quantity) -> float:
     """Factor to SI by the longest ending that is a unit, 1 without; InputError if another's."""
-    words = column.split("_")
-    endings = ["_".join(words[i:]) for i in range(1, len(words))]
-    if quantity.column.removeprefix(f"{quantity.stem}_") in endings:
-        return 1.0
-    for ending in endings:
-        unit = read_heading(ending)
-        factor = None if unit is None else factor_to(unit, quantity)
-        if factor is not None:
-            return factor
-        if unit is not None:
-            raise InputError(
-                f"The column {column} has the unit {ending.replace('_', '/')}, which is not a unit "
-                f"of {quantity.stem}. End its name with one of {quantity.unit}, as in {column[:40]}"
-                f"_{quantity.column.removeprefix(quantity.stem + '_')}."
-            )
+    words, own = column.split("_"), quantity.column.removeprefix(f"{quantity.stem}_")
+    for stem in ("_".join(words[:i]) for i in range(1, len(words))):
+        found = find_column([column], Quantity(stem, f"{stem}_{own}", quantity.unit))
+        if found is not None:
+            return found[1]
     return 1.0
 
 
