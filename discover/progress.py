@@ -52,17 +52,53 @@ def require_wanted() -> None:
         raise Stopped
 
 
-def rising(progress: Progress | None) -> Progress:
-    """Return what passes lines on with the largest fraction so far."""
+def by_time(
+    progress: Progress | None, clock: Callable[[], float] = time.perf_counter
+) -> Callable[..., None]:
+    """Return what passes on lines with the seconds to come, as the fraction of all time.
+
+    It never falls. While the seconds are not known (None), a fraction stands in their place.
+    """
+    begun = progress.begun if isinstance(progress, FollowedBy) else clock()
     largest = 0.0
 
-    def say(text: str, fraction: float) -> None:
+    def say(text: str, left: float | None, fraction: float = 0.0) -> None:
         nonlocal largest
+        passed = clock() - begun
+        if left is not None:
+            fraction = passed / max(passed + left, 1e-9)
         largest = max(largest, min(fraction, 1.0))
         (progress or silent)(text, largest)
 
     return say
 
+
+class Crowding:
+    """How much longer this process takes than alone on the machine of which seconds are told.
+
+    The time that this machine takes for a piece of work over the time there (`slow`), times that on
+    the clock over that of its processors: one at least, which other processes raise that want the
+    same cores. Counted from the beginning.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.perf_counter,
+        processor: Callable[[], float] = time.process_time,
+        slow: Callable[[], float] | None = None,
+    ):
+        self._clock, self._processor, self._slow = clock, processor, slow or slowness
+        self._begun = clock(), processor()
+
+    def __call__(self) -> float:
+        """Return the factor so far."""
+        passed, worked = self._clock() - self._begun[0], self._processor() - self._begun[1]
+        crowded = max(1.0, passed / worked) if worked > _TELLING else 1.0
+        return self._slow() * crowded
+
+
+_TELLING = 0.2
+"""Seconds of the processor that tell how crowded a machine is."""
 
 _STEPS, _TIMES = 50_000, 5
 _REFERENCE = 0.0010
@@ -82,31 +118,39 @@ def slowness() -> float:
     return min(times) / _REFERENCE
 
 
+STATES = 0.125
+"""Fraction that is done when states alone begin to be searched: most are found to be those of an
+inelastic material at once. It is of the drawing too."""
+
+
 class FollowedBy:
-    """Progress of a part, after which others take so many seconds on the machine of `slowness`."""
+    """Progress of a part from the beginning, after which others take so many seconds.
+
+    `seconds`: on a machine of its own. `crowding`: how much longer it takes.
+    """
 
     def __init__(
         self,
         progress: Progress | None,
         seconds: float,
         clock: Callable[[], float] = time.perf_counter,
-        slow: Callable[[], float] | None = None,
+        crowding: Callable[[], float] | None = None,
     ):
-        self._progress, self._clock, self._slow = progress, clock, slow or slowness
+        self._progress, self._seconds, self._clock = progress, seconds, clock
+        self._crowding = crowding or Crowding()
+        self.begun = progress.begun if isinstance(progress, FollowedBy) else clock()
         self._largest = 0.0
-        self.expect(seconds)
 
     def expect(self, seconds: float) -> None:
-        """Begin another part, which others take so long after."""
-        self._seconds, self._begun, self._before = seconds, self._clock(), self._largest
+        """Set how long others take after the part that begins now; its time counts from before."""
+        self._seconds = seconds
 
     def __call__(self, text: str, fraction: float) -> None:
         """Pass on a line, with the fraction of all time."""
-        if fraction > 0.0:
-            passed = self._clock() - self._begun
-            fraction = passed / max(passed / fraction + self._seconds * self._slow(), 1e-9)
-        whole = self._before + (1.0 - self._before) * fraction
-        self._largest = max(self._largest, whole)
+        if fraction > STATES:
+            passed = self._clock() - self.begun
+            fraction = passed / (passed / fraction + self._seconds * self._crowding())
+        self._largest = max(self._largest, fraction)
         (self._progress or silent)(text, self._largest)
 
 
@@ -124,10 +168,12 @@ def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:
 
 def by_steps(progress: Progress | None) -> Callable[[int, int, float], None]:
     """Return what passes on steps of at most so many, with their loss; the fraction never falls."""
-    tell = rising(progress)
+    largest = 0.0
 
     def say(step: int, total: int, loss: float) -> None:
-        tell(f"step {step} of at most {total}, loss {loss:.2g}", step / max(total, 1))
+        nonlocal largest
+        largest = max(largest, step / max(total, 1))
+        (progress or silent)(f"step {step} of at most {total}, loss {loss:.2g}", largest)
 
     return say
 

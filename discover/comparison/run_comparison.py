@@ -33,7 +33,7 @@ from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
-from discover.loop.search_progress import ComparisonProgress
+from discover.loop.search_time import ComparisonTime
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
 from discover.progress import Progress, silent
@@ -119,13 +119,15 @@ def compare(
         if simple is not None:
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
-    done = ComparisonProgress(progress, MOST_EFFECTS, len(declared.modulus) > 1)
+    several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
+    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
     progress("searching among laws, effects and terms", 0.0)
-    found = search_hypotheses(study, data, declared, library, done.searching)
+    found = search_hypotheses(study, data, declared, library, times.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
+    times.learning()
 
-    own = learning.outcomes(options.learners, frame, done.learned)
-    done.weighing("weighing what was found")
+    own = learning.outcomes(options.learners, frame, times.learned)
+    times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
     found = found.with_curves()

@@ -25,10 +25,10 @@ from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Fold
 from discover.loop.preference import with_named_law_first
 from discover.loop.runs import MOST_SAMPLES
-from discover.loop.search_progress import SearchProgress
+from discover.loop.search_time import SearchTime
 from discover.loop.simple import inelastic_result, simple_result
 from discover.loop.task import Say, Task
-from discover.progress import Progress, rising
+from discover.progress import STATES, Progress, by_time
 from discover.study.data import StudyData, temperature
 from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study
@@ -106,12 +106,16 @@ def run_study(
     """
     options: dict[str, Any] = dict(study.loop) | {"laws": declared.choice, "fit": data.fit.names}
     options |= {} if effects is None else {"effects": effects}
-    model, tell = forward_model(declared), rising(progress)
+    model, tell = forward_model(declared), by_time(progress)
     rounds = 1 + len(data.fit) if data.each else 1
-    done = SearchProgress(study.loop.max_effects, len(model.modulus) > 1, rounds)
+    sheared = all(run.protocol.control == "rate" and run.flow == "shear" for run in data.fit.runs)
+    held_out = data.each or bool(len(data.held_out))
+    several = len(model.modulus) > 1
+    left = SearchTime(study.loop.max_effects, several, rounds, held_out, sheared)
+    states = not any(run.protocol.control in ("rate", "stress") for run in data.fit.runs)
 
     def say(line: str) -> None:
-        tell(line, done.heard(line))
+        tell(line, left.heard(line), STATES if states else 0.0)
 
     if data.each:
         result = run_loop_on_each(data.dataset, model, progress=say, **options)
