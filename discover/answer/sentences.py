@@ -38,7 +38,7 @@ def quality(answer: Any) -> str:
 def _first_lines(answer: Any) -> tuple[str, str]:
     """Return both, as short as need be: what gives way is in the table."""
     told = "", ""
-    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2)):
+    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2)):
         parts = description(answer, brief), answer.failed, where(answer)
         told = _law(answer, most), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
@@ -69,14 +69,20 @@ def _law(answer: Any, most: int) -> str:
     certain = [one for one in own if one.determined and not one.is_vague]
     named = constants(certain[:most])
     if several and not answer.is_empirical:
-        named.append(counted(len(answer.modes), "mode"))
+        # a solvent, or modes faster than the data: a melt has the one and no other
+        and_viscosity = answer.solvent_viscosity_Pa_s and "eta_s" not in (one.name for one in own)
+        named.append(counted(len(answer.modes), "mode") + " and η_s" * bool(and_viscosity))
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
+    for one in answer.constants:
+        if one.name in OF_SWEEP and one.has_interval and not one.holds(1.0):
+            level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
+            named.append(f"{OF_SWEEP[one.name]} {one.measured(level)} times the sweep's")
     if answer.temperature_C is not None:
         # the rates of use are not at the one that times are reduced to
-        what = "times referred to" if answer.shift_factors else "at"
+        what = "reference temperature" if answer.shift_factors else "at"
         named.append(f"{what} {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
@@ -98,7 +104,10 @@ def is_a_set(answer: Any) -> bool:
     )
 
 
-_OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
+OF_SWEEP = {"modulus_factor": "moduli", "relaxation_time_factor": "relaxation times"}
+"""Constants that say by how much the runs differ from the sweep, and in what."""
+
+_OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
 
 
 def description(answer: Any, brief: int = 0) -> str:
@@ -138,12 +147,16 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
         for name, symbol in SYMBOLS.items()
         if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
     ]
-    told = each if len(each) > 1 else [size]
+    more = []
     if (worst := worst_run(answer)) is not None:
-        told.append(f"worst run {worst[1]}")
+        more.append(f"worst run {worst[1]}")
     stress = answer.expected("sigma12")
     if stress.beyond is not None and stress.beyond_at.startswith(MEASURED_AT) and brief < _BRIEFEST:
-        told.append(f"faster ones {_at_most(stress.beyond)}")
+        at = stress.beyond_at.removeprefix(MEASURED_AT).strip()
+        more.append(f"beyond range {_at_most(stress.beyond)} at {at}")
+    told = [*each, *more] if len(each) > 1 else [size, *more]
+    if len(each) > 1 and more and answer.range.flows == ("shear",):  # these are runs of σ12
+        told = [f"{each[0]} ({', '.join(more)})", *each[1:]]
     return f"Error on {answer.discrepancy.unseen}: {', '.join(told)}"
 
 
@@ -226,14 +239,21 @@ def _place(answer: Any) -> str:
     """
     one = answer.range
     if modes.is_plain(answer) and one.weissenberg is not None:
-        numeral = "λω" if one.oscillates else "λ/duration"
-        slow = "" if one.deborah is None else f", De = {numeral} = {modes.span(one.deborah)}"
+        slow = ""
+        if one.deborah is not None and one.oscillates:
+            # what is slower than the fluid relaxes is nearly steady
+            near = one.deborah[0] < _NEARLY_STEADY
+            ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
+            slow = f", oscillating at De = λω {ends}"
         return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{slow}"
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
         return f"{rates}{reduced}" if (rates := _rates(one)) else ""
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
     return listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}"
+
+
+_NEARLY_STEADY = 0.5  # Deborah number below which a fluid relaxes several times in each cycle
 
 
 def _rates(one: Any) -> str:

@@ -378,9 +378,24 @@ def _law(equation: Equation, rest: bool = False) -> str:
             one.equation.replace("_k", index) + _at_rest(one.states, part.own)
             for one, part in zip(equation.spelled_states, equation.states, strict=True)
         ]
-        return text + _formulas(parts)
+        return text + _formulas(_scaled_once(parts))
     except InputError:  # nobody said how a law of their own is written
         return ""
+
+
+_SCALED = re.compile(r"(\S+) \\to (.+?)(?:\\,)?\s*\1")
+
+
+def _scaled_once(equations: Sequence[str]) -> list[str]:
+    """Return equations of states, with one product for what several of them scale."""
+    parted = [one.partition(r",\quad") for one in equations]
+    found = [_SCALED.fullmatch(first) for first, _, _ in parted]
+    scaled = {one[1] for one in found if one}
+    if len(scaled) != 1 or not all(found) or len(found) < 2:
+        return list(equations)
+    product = r"\,".join(one[2] for one in found if one)
+    (what,) = scaled
+    return [rf"{what} \to {product}\,{what}", *(rest for _, _, rest in parted)]
 
 
 def _at_rest(states: Sequence[str], effect: StateEffect) -> str:

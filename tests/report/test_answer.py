@@ -33,10 +33,10 @@ def test_the_first_line_has_law_constants_error_and_range():
     # faster runs that were held out have an error of their own, where one was measured
     fast = ExpectedError(0.06, 0.18, "measured at 9 1/s")
     told = replace(MELT, expected_error={"sigma12": fast}).headline
-    assert "6 % (95 % CI 4–7 %), worst run 8 %, faster ones 18 %, corrected" in told
+    assert "(95 % CI 4–7 %), worst run 8 %, beyond range 18 % at 9 1/s, corrected" in told
     assert "worst run 8 %; noise 8 %," in replace(MELT, noise=0.08).headline  # known no better
     computed = replace(fast, beyond_at="predicted at 2× the rate")
-    assert "faster" not in replace(MELT, expected_error={"sigma12": computed}).headline
+    assert "beyond" not in replace(MELT, expected_error={"sigma12": computed}).headline
     one_frequency = replace(MELT.range, frequency_rad_s=(1.0, 1.0))
     assert "3 1/s, oscillating at 1 rad/s." in replace(MELT, range=one_frequency).headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
@@ -94,13 +94,41 @@ def test_shifted_runs_have_their_range_at_the_temperatures_of_the_measurement():
         MELT, temperature_C=-35.0, shift_factors={-10.0: 1.0 / 131.2},
         range=replace(MELT.range, by_temperature={-10.0: hot, -23.0: cold}),
     )  # fmt: skip
-    assert "2 modes, times referred to −35 °C. " in shifted.headline
+    assert "2 modes, reference temperature −35 °C. " in shifted.headline
     assert "use for σ12 only, 0.01–3 1/s at −10 °C and 1–5 1/s at −23 °C." in shifted.headline
     assert shifted.use["range"]["rate_1_s"] == [0.003, 3.0]  # that of the moduli and times
     assert shifted.use["range"]["by_temperature_C"]["-10"]["rate_1_s"] == [0.01, 3.0]
     many = {at: hot for at in (-10.0, -15.0, -20.0)} | {-23.0: cold}
     several = replace(shifted, range=replace(shifted.range, by_temperature=many))
     assert "0.01–3 1/s at −10 °C to 1–5 1/s at −23 °C." in several.headline
+
+
+def test_runs_with_other_moduli_than_the_sweep_say_so_in_the_first_line():
+    factor = Constant("modulus_factor", 0.52, (0.04, 0.79))
+    told = replace(MELT, constants=(*MELT.constants, factor)).headline
+    assert "2 modes, moduli 0.52 (0.04–0.79) times the sweep's. " in told
+    alone = replace(MELT, constants=(factor,), law=None).headline
+    assert "moduli 0.52 (95 % CI 0.04–0.79) times the sweep's. " in alone
+    for one in (replace(factor, ci95=(0.5, 1.1)), replace(factor, determined=False)):
+        assert "the sweep's" not in replace(MELT, constants=(one,)).headline
+
+
+def test_a_viscosity_beside_the_modes_is_that_of_no_solvent_in_particular():
+    told = replace(MELT, solvent_viscosity_Pa_s=5.0).headline
+    assert "2 modes and η_s. " in told
+    fitted = (*MELT.constants, Constant("eta_s", 5.0, (4.0, 6.0), "Pa s"))
+    told = replace(MELT, solvent_viscosity_Pa_s=5.0, constants=fitted).headline
+    assert "η_s = 5.0 Pa s (4.0–6.0), 2 modes. " in told  # not twice
+
+
+@pytest.mark.parametrize(
+    ("slowest", "said"), [(0.25, "oscillating at De = λω ≤ 2."), (0.6, "De = λω = 0.6–2.")]
+)
+def test_slow_oscillation_is_a_range_that_holds_steady_shear(slowest, said):
+    plain = replace(MELT, modes=(Mode(1.0, 1.0),), range=Range((1.0, 3.0), (slowest, 2.0)))
+    assert f"Wi = λγ̇ ≤ 3, {'' if slowest < 0.5 else 'oscillating at '}{said}" in plain.headline
+    started = replace(plain, range=replace(plain.range, oscillates=False))
+    assert "De" not in started.headline  # steady shear goes on for longer than any run
 
 
 @pytest.mark.parametrize("given", [0.0, -0.1, 2.0])
@@ -122,7 +150,9 @@ def test_a_suspected_share_is_a_percentage_of_something_and_others_have_units():
     assert MELT.suspects[0].text == "stress gain −11 % (95 % CI −36 to 2), not established"
     loss = Constant("loss", 0.018, (0.012, 0.022), meaning="of the stress per unit strain")
     said = Suspect("edge_fracture", (loss,)).text
-    assert said.startswith("edge fracture 1.80 % of the stress per unit strain (95 % CI 1.20–2.20)")
+    assert said.startswith(
+        "torque loss with strain 1.80 % of the stress per unit strain (95 % CI 1.20–2.20)"
+    )
     lag = Constant("tau", 0.35, (0.13, 0.48), "s", meaning="tau")
     assert Suspect("transducer_lag", (lag,)).text == "transducer lag 0.35 s (95 % CI 0.13–0.48)"
 
@@ -217,7 +247,7 @@ def test_a_maxwell_fluid_with_a_structure_is_thixotropic_only_where_runs_show_re
     names = ("solvent_viscosity", "thixotropic_relaxation")
     stages = [replace(result.stages[0], effect=one, kind="constitutive") for one in names]
     found = replace(result, stages=tuple(stages), declared_law=Equation(()))
-    said = "upper convected Maxwell with rate-softened relaxation and Newtonian part"
+    said = "upper convected Maxwell with rate-softened relaxation and Newtonian viscosity"
     assert found.answer.title == said
     two = replace(stages[1], effect="thixotropic_relaxation_two_times")
     both = replace(found, stages=(*stages, two)).answer  # two structures are one kind of fluid
@@ -243,7 +273,10 @@ def test_a_maxwell_fluid_with_a_structure_is_thixotropic_only_where_runs_show_re
 def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_has_the_worst_run():
     errors = {**MELT.expected_error, "uniaxial": ExpectedError(0.17, note="unseen runs")}
     told = replace(MELT, expected_error=errors).headline
-    assert "Error on unseen runs: σ12 6 %, uniaxial extension 17 %, worst run 8 %, " in told
+    assert "runs: σ12 6 % (worst run 8 %), uniaxial extension 17 %, corrected" in told
+    both = replace(MELT.range, flows=("shear", "uniaxial"))  # the worst may be either
+    told = replace(MELT, expected_error=errors, range=both).headline
+    assert "runs: σ12 6 %, uniaxial extension 17 %, worst run 8 %, shear corrected" in told
     # not of what the law alone says, nor of fitted runs
     for other in ({"is_measured": False}, {"is_residual": True}):
         same = {**errors, "uniaxial": replace(errors["uniaxial"], **other)}
