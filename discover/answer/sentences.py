@@ -1,7 +1,7 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from discover.answer import modes_in_words as modes
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
@@ -79,7 +79,7 @@ def _law(answer: Any, most: int) -> str:
     for one in answer.constants:
         if one.name in OF_SWEEP and one.has_interval and not one.holds(1.0):
             level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
-            named.append(f"{OF_SWEEP[one.name]} {one.measured(level)} times the sweep's")
+            named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None:
         # the rates of use are not at the one that times are reduced to
         what = "reference temperature" if answer.shift_factors else "at"
@@ -227,7 +227,7 @@ def where(answer: Any) -> str:
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     only = " only" * (len(quantities) == 1 and not implied)
-    use = "If that suffices, use" if answer.adequate is False else "Use"
+    use = f"If {percent_of(answer.size)} suffices, use" if answer.adequate is False else "Use"
     more = f" ({listed(implied)} if the law is right)" if implied else ""
     return f"{use} for {listed(quantities)}{only}{more}, {place}."
 
@@ -284,6 +284,48 @@ def worst_run(answer: Any) -> tuple[str, str] | None:
     return name, percent_of(over[name])
 
 
+class Row(NamedTuple):
+    """Row of the table of errors: quantities, on what that rests, errors in the range and beyond.
+
+    `is_known`: whether there is a number; else both errors are one reason why not.
+    """
+
+    symbol: str
+    note: str
+    inside: str
+    beyond: str = ""
+    beyond_at: str = ""
+    is_known: bool = True
+
+    @property
+    def text(self) -> str:
+        """The row as text goes on."""
+        beyond = f", beyond {self.beyond} ({self.beyond_at})" if self.beyond_at else ""
+        return f"{self.symbol} {self.inside}{f' ({self.note})' if self.note else ''}{beyond}"
+
+
+def errors(answer: Any) -> list[Row]:
+    """Return errors by quantity, of the run that is missed most, and of the best classical law.
+
+    Quantities of which nothing is known for the same reason share a row.
+    """
+    found: list[Row] = []
+    for name, symbol in SYMBOLS.items():
+        one = answer.expected(name)
+        told = [_error(one, value) for value in (one.inside, one.beyond)]
+        at = one.beyond_at if one.beyond is not None else ""
+        row = Row(symbol, note(answer, name), *told, at, one.is_known)
+        if found and not row.is_known and found[-1] == row._replace(symbol=found[-1].symbol):
+            row = row._replace(symbol=f"{found.pop().symbol}, {symbol}")
+        found.append(row)
+    if (worst := worst_run(answer)) is not None:
+        found.append(Row("worst run in range", *worst))
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        found.append(Row("best classical law", near, percent_of(error)))
+    return found
+
+
 def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
     of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
@@ -296,9 +338,8 @@ def note(answer: Any, quantity: str) -> str:
     return ", ".join(filter(None, [answer.expected(quantity).note, above]))
 
 
-def expected(one: Any, place: str) -> str:
-    """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
-    value = one.inside if place == "inside" else one.beyond
+def _error(one: Any, value: float | None) -> str:
+    """Return an expected error, or why there is none."""
     if value is not None:
         return _at_most(value) if value else "within noise"
     return "not measured" if one.is_known else one.missing
@@ -323,9 +364,6 @@ def suspects(answer: Any) -> str:
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 
-CLASSICAL = "Best classical law"
-"""What stands before a law of the field that comes next to a sum without a name."""
-
 SUSPECTED = "Suspected in the measurement, not part of the law"
 """Heading of effects of the instrument and of the flow in the gap."""
 
@@ -342,21 +380,8 @@ def lines(answer: Any) -> list[str]:
     """Return the answer as lines of text."""
     found = [headline(answer)]
     if answer.title:
-        parts = []
-        for name, symbol in SYMBOLS.items():
-            one = answer.expected(name)
-            rests = note(answer, name)
-            text = f"{symbol} {expected(one, 'inside')}{f' ({rests})' if rests else ''}"
-            if one.beyond is not None:
-                at = f" ({one.beyond_at})" if one.beyond_at else ""
-                text += f", beyond the range {_at_most(one.beyond)}{at}"
-            parts.append(text)
-        if (worst := worst_run(answer)) is not None:
-            parts.append("worst run {}, {}".format(*worst))
-        found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    if answer.best_classical is not None:
-        near, error = answer.best_classical
-        found.append(f"{CLASSICAL}: {near}, error {percent_of(error)}.")
+        told = "; ".join(row.text for row in errors(answer))
+        found.append(f"{error_title(answer)}: {told}.")
     found += [modes.shifted(answer), suspects(answer), answer.alternative]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

@@ -207,7 +207,7 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     name, least = _MAXIMUM.get(near.law, ("", 0.0))
     has_maximum = name in near.constants and near.constants[name].value > least
-    maximum = " (flow curve with a maximum)" if has_maximum else ""
+    maximum = ", flow curve with a maximum" if has_maximum else ""
     return f"{', '.join(said)}{maximum}", near.size
 
 

@@ -17,9 +17,10 @@ from discover.equations.parts import NamedPart, StatePart
 from discover.equations.spelling.markup import law_element
 from discover.equations.spelling.plain_signs import plain
 from discover.loop.answering import rest_of_h
+from discover.report.first_screen import answer_screen
 from discover.report.loop import write_loop
 from discover.report.mathtext import formula
-from discover.report.page import answer_screen, render
+from discover.report.page import render
 from discover.study import RunFolder
 from tensor_library.law_terms import LawTerm
 
@@ -31,11 +32,11 @@ from tensor_library.law_terms import LawTerm
 def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate, said):
     answer = replace(MELT, tolerance=asked)
     assert answer.adequate is adequate
-    use = "Use" if adequate else "If that suffices, use"
+    use = "Use" if adequate else "If 6 % suffices, use"
     assert f"tolerance {said}. {use} for" in answer.headline
-    assert any("worst run a.csv, 8 %" in line for line in answer.lines) is not adequate
+    assert any("worst run in range 8 % (a.csv)" in line for line in answer.lines) is not adequate
     *_, last = answer_screen(answer)["expected"]
-    assert ((last["note"], last["inside"]) == ("a.csv", "8\N{NO-BREAK SPACE}%")) is not adequate
+    assert ((last.note, last.inside) == ("a.csv", "8\N{NO-BREAK SPACE}%")) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None
     assert Answer("", instead="No signal.").adequate is None
 
@@ -194,10 +195,10 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
     runs = replace(MELT.discrepancy, by_run={"a": 0.06, "b": 0.09, "c": 0.01})
     several = replace(MELT, discrepancy=runs)
     assert tolerance(several) == "tolerance 5 % missed in 2 of 3 runs"
-    assert answer_screen(several)["expected"][-1]["note"] == "b"
+    assert answer_screen(several)["expected"][-1].note == "b"
     by_law = ExpectedError(0.15, note="constants alone", is_measured=False)
     errors = {**MELT.expected_error, "N1": by_law, "uniaxial": ExpectedError(0.05)}
-    rows = {one["symbol"]: one["note"] for one in answer_screen(
+    rows = {one.symbol: one.note for one in answer_screen(
         replace(several, expected_error=errors))["expected"]}  # fmt: skip
     assert rows["N1"] == "constants alone, above tolerance"
     assert rows["uniaxial extension"] == ""
@@ -317,7 +318,7 @@ def test_quantities_that_nothing_is_known_of_share_a_row():
     none = ExpectedError()
     fluid = replace(MELT, expected_error={"sigma12": ExpectedError(0.01), "N1": none, "N2": none})
     rows = answer_screen(fluid)["expected"]
-    assert [one["symbol"] for one in rows[:2]] == ["σ12", "N1, N2, uniaxial extension"]
+    assert [one.symbol for one in rows[:2]] == ["σ12", "N1, N2, uniaxial extension"]
     page = render("answer.html", screen=answer_screen(fluid))
     table = page[page.index('<table id="answer-table">') : page.index("</table>")]
     assert table.count('class="both">not measured') == 1
@@ -342,7 +343,7 @@ def test_a_chance_and_a_level_keep_to_a_line():
 
 def test_numbers_keep_to_a_line_with_their_units():
     sure, *_ = answer_screen(MELT)["expected"]
-    assert sure["inside"] == "6\N{NO-BREAK SPACE}%"
+    assert sure.inside == "6\N{NO-BREAK SPACE}%"
     exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
     (row,) = answer_screen(exact)["constants"]
     assert row[2].split(" ") == ["2\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10⁻⁷", row[2][-4:]]
