@@ -244,7 +244,7 @@ def _place(answer: Any) -> str:
             # what is slower than the fluid relaxes is nearly steady
             near = one.deborah[0] < _NEARLY_STEADY
             ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
-            slow = f", oscillating at De = λω {ends}"
+            slow = f", {'steady or ' * near}oscillating at De = λω {ends}"
         return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{slow}"
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""

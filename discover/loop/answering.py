@@ -219,6 +219,8 @@ _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
+    # as their equations stand (`discover.effects.letters`)
+    in_fluid.sort(key=lambda one: (0, one.effect) if one.effect in STRUCTURES else (1, ""))
     found = list(_constants(result.declared_parameters))
     for stage in in_fluid:
         own = _of_stage(result, stage)
