@@ -171,10 +171,6 @@ class Constant:
         level = f"{level.strip()}, " if level.strip() else ""
         return f"{self.interval}{self.reciprocal._unit} ({level}best fit {self.number})"
 
-    def holds(self, value: float) -> bool:
-        """Return whether its interval holds a value."""
-        return self.ci95 is not None and self.ci95[0] <= value <= self.ci95[1]
-
     @property
     def is_skewed(self) -> bool:
         """Whether the value, the best of all constants together, is near an end of its interval.

@@ -77,7 +77,7 @@ def _law(answer: Any, most: int) -> str:
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     for one in answer.constants:
-        if one.name in OF_SWEEP and one.has_interval and not one.holds(1.0):
+        if one.name in OF_SWEEP and one.determined and differ(one.ci95, answer.tolerance):
             level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
             named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None:
@@ -105,7 +105,14 @@ def is_a_set(answer: Any) -> bool:
 
 
 OF_SWEEP = {"modulus_factor": "moduli", "relaxation_time_factor": "relaxation times"}
-"""Constants that say by how much the runs differ from the sweep, and in what."""
+"""Factors on moduli or times of the sweep that the runs want, and on what."""
+
+
+def differ(ci95: Sequence[float] | None, tolerance: float) -> bool:
+    """Return whether the interval of a factor says that it is not one, but for a tolerance."""
+    low, high = ci95 or (1.0, 1.0)
+    return high < 1.0 - tolerance or low > 1.0 + tolerance
+
 
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
 

@@ -51,10 +51,6 @@ class StageParameter:
         both = 0.0 < low < abs(self.value) / _DECADE and high > _DECADE * abs(self.value)
         return both or high > _OPEN * abs(self.value)
 
-    def holds(self, value: float) -> bool:
-        """Whether its interval holds a value."""
-        return self.ci95[0] <= value <= self.ci95[1]
-
     def is_open_up_to(self, end: float) -> bool:
         """Whether it is open in a range: from two decades below its upper end, to that end."""
         low, high = self.ci95

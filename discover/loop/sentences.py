@@ -5,7 +5,7 @@ from typing import Any
 
 from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.runs import RunRecord
 
@@ -97,7 +97,7 @@ def what_to_measure_next(result: Any) -> str:
 def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     fitted = [one for name, one in result.declared_parameters.items() if name in OF_SWEEP]
-    if all(one.is_open or one.holds(1.0) for one in fitted):
+    if not any(differ(one.ci95, result.tolerance) for one in fitted if not one.is_open):
         return ""
     return "Repeat the frequency sweep on the loading of these runs."
 
