@@ -28,26 +28,17 @@ _ENTRY = re.compile(r".*-[0-9a-f]{64}-cache")
 """Names that JAX gives: that of the function, and a digest."""
 
 
-_found: Counter[str] = Counter()
-_EVENT = "/jax/compilation_cache/cache_"
-"""Begin of what JAX calls a program that was kept, ``hits``, or was not, ``misses``."""
+_found: Counter[bool] = Counter()
 
 
-@cache
-def _count_programs() -> None:
-    import jax
-
-    def count(event: str, **_: object) -> None:
-        if event.startswith(_EVENT):
-            _found[event.removeprefix(_EVENT)] += 1
-
-    jax.monitoring.register_event_listener(count)
+def count_program(kept: bool) -> None:
+    """Count a program that an earlier start kept, or that has to be compiled."""
+    _found[kept] += 1
 
 
 def compiled_share() -> float:
     """Return the share of programs of this process that were compiled, and not kept before."""
-    programs = _found["hits"] + _found["misses"]
-    return _found["misses"] / programs if programs else 0.0
+    return _found[False] / max(_found.total(), 1)
 
 
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
@@ -59,7 +50,6 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     """
     import jax
 
-    _count_programs()
     if os.environ.get("DISCOVER_NO_CACHE"):
         return None
     chosen = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]

@@ -146,7 +146,9 @@ _EFFECTS = {
     "ptt_exponential": "exponential PTT",
     "rate_rise_time": "slow motor",
     "relaxation_mode": "added mode",
-    "solvent_viscosity": "Newtonian part",
+    "solvent_viscosity": "Newtonian viscosity",
+    # whatever takes the torque away: of a broken edge runs alone say no more
+    "edge_fracture": "torque loss with strain",
     # what runs show; that it is thixotropy would take recovery at rest
     "thixotropy": "flow softening",
     "thixotropic_modulus": "rate-softened modulus",

@@ -1,7 +1,7 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from discover.answer import modes_in_words as modes
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
@@ -38,7 +38,7 @@ def quality(answer: Any) -> str:
 def _first_lines(answer: Any) -> tuple[str, str]:
     """Return both, as short as need be: what gives way is in the table."""
     told = "", ""
-    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2)):
+    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2)):
         parts = description(answer, brief), answer.failed, where(answer)
         told = _law(answer, most), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
@@ -69,14 +69,20 @@ def _law(answer: Any, most: int) -> str:
     certain = [one for one in own if one.determined and not one.is_vague]
     named = constants(certain[:most])
     if several and not answer.is_empirical:
-        named.append(counted(len(answer.modes), "mode"))
+        # a solvent, or modes faster than the data: a melt has the one and no other
+        and_viscosity = answer.solvent_viscosity_Pa_s and "eta_s" not in (one.name for one in own)
+        named.append(counted(len(answer.modes), "mode") + " and η_s" * bool(and_viscosity))
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
+    for one in answer.constants:
+        if one.name in OF_SWEEP and one.determined and differ(one.ci95, answer.tolerance):
+            level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
+            named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None:
         # the rates of use are not at the one that times are reduced to
-        what = "times referred to" if answer.shift_factors else "at"
+        what = "reference temperature" if answer.shift_factors else "at"
         named.append(f"{what} {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
@@ -98,7 +104,17 @@ def is_a_set(answer: Any) -> bool:
     )
 
 
-_OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
+OF_SWEEP = {"modulus_factor": "moduli", "relaxation_time_factor": "relaxation times"}
+"""Factors on moduli or times of the sweep that the runs want, and on what."""
+
+
+def differ(ci95: Sequence[float] | None, tolerance: float) -> bool:
+    """Return whether the interval of a factor says that it is not one, but for a tolerance."""
+    low, high = ci95 or (1.0, 1.0)
+    return high < 1.0 - tolerance or low > 1.0 + tolerance
+
+
+_OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
 
 
 def description(answer: Any, brief: int = 0) -> str:
@@ -138,12 +154,16 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
         for name, symbol in SYMBOLS.items()
         if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
     ]
-    told = each if len(each) > 1 else [size]
+    more = []
     if (worst := worst_run(answer)) is not None:
-        told.append(f"worst run {worst[1]}")
+        more.append(f"worst run {worst[1]}")
     stress = answer.expected("sigma12")
     if stress.beyond is not None and stress.beyond_at.startswith(MEASURED_AT) and brief < _BRIEFEST:
-        told.append(f"faster ones {_at_most(stress.beyond)}")
+        at = stress.beyond_at.removeprefix(MEASURED_AT).strip()
+        more.append(f"beyond range {_at_most(stress.beyond)} at {at}")
+    told = [*each, *more] if len(each) > 1 else [size, *more]
+    if len(each) > 1 and more and answer.range.flows == ("shear",):  # these are runs of σ12
+        told = [f"{each[0]} ({', '.join(more)})", *each[1:]]
     return f"Error on {answer.discrepancy.unseen}: {', '.join(told)}"
 
 
@@ -214,7 +234,7 @@ def where(answer: Any) -> str:
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     only = " only" * (len(quantities) == 1 and not implied)
-    use = "If that suffices, use" if answer.adequate is False else "Use"
+    use = f"If {percent_of(answer.size)} suffices, use" if answer.adequate is False else "Use"
     more = f" ({listed(implied)} if the law is right)" if implied else ""
     return f"{use} for {listed(quantities)}{only}{more}, {place}."
 
@@ -226,14 +246,21 @@ def _place(answer: Any) -> str:
     """
     one = answer.range
     if modes.is_plain(answer) and one.weissenberg is not None:
-        numeral = "λω" if one.oscillates else "λ/duration"
-        slow = "" if one.deborah is None else f", De = {numeral} = {modes.span(one.deborah)}"
+        slow = ""
+        if one.deborah is not None and one.oscillates:
+            # what is slower than the fluid relaxes is nearly steady
+            near = one.deborah[0] < _NEARLY_STEADY
+            ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
+            slow = f", {'steady or ' * near}oscillating at De = λω {ends}"
         return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{slow}"
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
         return f"{rates}{reduced}" if (rates := _rates(one)) else ""
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
     return listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}"
+
+
+_NEARLY_STEADY = 0.5  # Deborah number below which a fluid relaxes several times in each cycle
 
 
 def _rates(one: Any) -> str:
@@ -264,6 +291,48 @@ def worst_run(answer: Any) -> tuple[str, str] | None:
     return name, percent_of(over[name])
 
 
+class Row(NamedTuple):
+    """Row of the table of errors: quantities, on what that rests, errors in the range and beyond.
+
+    `is_known`: whether there is a number; else both errors are one reason why not.
+    """
+
+    symbol: str
+    note: str
+    inside: str
+    beyond: str = ""
+    beyond_at: str = ""
+    is_known: bool = True
+
+    @property
+    def text(self) -> str:
+        """The row as text goes on."""
+        beyond = f", beyond {self.beyond} ({self.beyond_at})" if self.beyond_at else ""
+        return f"{self.symbol} {self.inside}{f' ({self.note})' if self.note else ''}{beyond}"
+
+
+def errors(answer: Any) -> list[Row]:
+    """Return errors by quantity, of the run that is missed most, and of the best classical law.
+
+    Quantities of which nothing is known for the same reason share a row.
+    """
+    found: list[Row] = []
+    for name, symbol in SYMBOLS.items():
+        one = answer.expected(name)
+        told = [_error(one, value) for value in (one.inside, one.beyond)]
+        at = one.beyond_at if one.beyond is not None else ""
+        row = Row(symbol, note(answer, name), *told, at, one.is_known)
+        if found and not row.is_known and found[-1] == row._replace(symbol=found[-1].symbol):
+            row = row._replace(symbol=f"{found.pop().symbol}, {symbol}")
+        found.append(row)
+    if (worst := worst_run(answer)) is not None:
+        found.append(Row("worst run in range", *worst))
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        found.append(Row("best classical law", near, percent_of(error)))
+    return found
+
+
 def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
     of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
@@ -276,9 +345,8 @@ def note(answer: Any, quantity: str) -> str:
     return ", ".join(filter(None, [answer.expected(quantity).note, above]))
 
 
-def expected(one: Any, place: str) -> str:
-    """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
-    value = one.inside if place == "inside" else one.beyond
+def _error(one: Any, value: float | None) -> str:
+    """Return an expected error, or why there is none."""
     if value is not None:
         return _at_most(value) if value else "within noise"
     return "not measured" if one.is_known else one.missing
@@ -303,9 +371,6 @@ def suspects(answer: Any) -> str:
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 
-CLASSICAL = "Best classical law"
-"""What stands before a law of the field that comes next to a sum without a name."""
-
 SUSPECTED = "Suspected in the measurement, not part of the law"
 """Heading of effects of the instrument and of the flow in the gap."""
 
@@ -322,21 +387,8 @@ def lines(answer: Any) -> list[str]:
     """Return the answer as lines of text."""
     found = [headline(answer)]
     if answer.title:
-        parts = []
-        for name, symbol in SYMBOLS.items():
-            one = answer.expected(name)
-            rests = note(answer, name)
-            text = f"{symbol} {expected(one, 'inside')}{f' ({rests})' if rests else ''}"
-            if one.beyond is not None:
-                at = f" ({one.beyond_at})" if one.beyond_at else ""
-                text += f", beyond the range {_at_most(one.beyond)}{at}"
-            parts.append(text)
-        if (worst := worst_run(answer)) is not None:
-            parts.append("worst run {}, {}".format(*worst))
-        found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    if answer.best_classical is not None:
-        near, error = answer.best_classical
-        found.append(f"{CLASSICAL}: {near}, error {percent_of(error)}.")
+        told = "; ".join(row.text for row in errors(answer))
+        found.append(f"{error_title(answer)}: {told}.")
     found += [modes.shifted(answer), suspects(answer), answer.alternative]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

@@ -14,6 +14,7 @@ from discover.answer import (
     Mode,
     Suspect,
 )
+from discover.answer import modes_in_words as modes
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
@@ -27,6 +28,7 @@ from discover.loop.fitted_range import range_of
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.runs import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
+from discover.statistics.residual import fast_part
 from discover.words import (
     effect_title,
     effects_title,
@@ -61,7 +63,8 @@ def loop_answer(result: Any) -> Answer:
     following = what_to_measure_next(result)
     if result.verdict == "no_signal":
         return Answer(
-            "", instead="No signal: these runs hold no more than noise, so no law is given.",
+            "", instead=f"No signal: these runs hold only noise{_scatter(result.records)}, "
+            "so no law is given.",
             noise=result.noise_floor, next_test=following, tolerance=result.tolerance,
         )  # fmt: skip
     if result.material is not None:
@@ -100,6 +103,13 @@ def loop_answer(result: Any) -> Answer:
         written = {"formula": rest_of_h(others)} if others else {}
         return replace(answer, shown=shown, classical=classical, written=written)
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+
+
+def _scatter(records: Sequence[RunRecord]) -> str:
+    """Return the scatter of recorded stresses, in words; empty where none has one."""
+    found = [fast_part(record.measured) for record in records if record.quantity != "strain"]
+    found = [one for one in found if one > 0.0]
+    return f" of {modes.span((min(found), max(found)))} Pa rms" if found else ""
 
 
 def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
@@ -197,7 +207,7 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     name, least = _MAXIMUM.get(near.law, ("", 0.0))
     has_maximum = name in near.constants and near.constants[name].value > least
-    maximum = " (flow curve with a maximum)" if has_maximum else ""
+    maximum = ", flow curve with a maximum" if has_maximum else ""
     return f"{', '.join(said)}{maximum}", near.size
 
 
@@ -209,6 +219,8 @@ _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
+    # as their equations stand (`discover.effects.letters`)
+    in_fluid.sort(key=lambda one: (0, one.effect) if one.effect in STRUCTURES else (1, ""))
     found = list(_constants(result.declared_parameters))
     for stage in in_fluid:
         own = _of_stage(result, stage)
@@ -218,7 +230,6 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
             own = _constants(known.parameters, (), known.effect)
             found += _renamed(known.effect, own, found)
     named = None if equation is None else named_law(equation)
-    solvent = equation is not None and equation.solvent_viscosity > 0.0
     if named is None:
         base = None if result.declared_law is None else named_law(result.declared_law)
         title = LAWS[base[0]].title if base else "law"
@@ -244,7 +255,7 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
             title = EMPIRICAL + title
         return None, title, tuple(found)
     name, values = named
-    title = LAWS[name].title + (" with Newtonian part" if solvent else "")
+    title = LAWS[name].title
     if name == "ucm" and not shows_a_derivative(result):
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"

@@ -128,7 +128,7 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
-            note = "not measured; if the law is right"
+            note = "not measured: spread of laws that fit as well"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
         elif kind == "N1" and differ:
             found[kind] = ExpectedError(missing="not determined", note=differ)

@@ -25,18 +25,17 @@ class _Part(NamedTuple):
 
 
 # Fits of each further effect and of exchanged effects: at most so many, and for one candidate
-_DEEPER, _EXCHANGED, _EACH = 24.0, 70.0, 2.0
-# Fit of one effect over one of several, more of them being given up at once; fits of an exchanged
-# hypothesis
-_FIRST, _EXCHANGE = 0.8, 1.4
+_DEEPER, _EXCHANGED, _EACH = 24.0, 50.0, 2.0
+# Fit of one effect over one of several; fits of an exchanged hypothesis
+_FIRST, _EXCHANGE = 1.2, 1.4
 # What is weighed after the search: with runs held out, when all are fitted again, or without
-_WEIGHED, _WEIGHED_ALONE = _Part(140.0, share=1.2), _Part(10.0)
+_WEIGHED, _WEIGHED_ALONE = _Part(175.0, share=1.05), _Part(15.0)
 # Curves of one variable; bands, intervals and the next test. All these were measured on two cores,
 # with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
 # two-mode PTT and noise. Seconds are those of the machine of `slowness`.
-_CURVES, _BANDS = _Part(20.0, 0.3, 1.2, 0.5), _Part(15.0, 0.5, 2.5, 0.7)
+_CURVES, _BANDS = _Part(2.0, 0.1), _Part(70.0, 0.1, 1.2, 0.43)
 # What is weighed after the second search, with more constants, over that after the first
-_SECOND = 1.3
+_SECOND = 1.4
 # Share of what follows a search where no effect is the likeliest: few hypotheses are near
 _FEW_NEAR = 0.2
 # Least share of the time that fits are taken to have had, the rest being seconds besides
@@ -157,7 +156,7 @@ class SearchTime:
 # Seconds in which learners learn, and in which laws are weighed: a constant, and what compiling
 # adds, which a crowded machine prolongs, and a share of the search's. Measured on the demonstration
 # and on LDPE.
-_LEARN, _WEIGH = (2.4, 8.0, 0.2), (2.6, 5.6, 0.25)
+_LEARN, _WEIGH = (5.0, 1.0, 0.2), (4.0, 2.0, 0.25)
 _SLOWER = 2.0  # Factor by which learning may change what is expected of weighing
 _LEAST = 0.15  # Share of a part's expected time that is still told of it once that time is over
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.runs import RunRecord
 
@@ -72,6 +72,8 @@ def what_to_measure_next(result: Any) -> str:
         return A_TRANSIENT
     if told := _telling_test(result):
         return told
+    if told := _of_sweep(result):
+        return told
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
@@ -90,6 +92,14 @@ def what_to_measure_next(result: Any) -> str:
         return f"To confirm {title}, {check}."
     others = several([*map(words.effect_title, doubtful.aliases)])
     return f"To distinguish {title} from {others}, {check}."
+
+
+def _of_sweep(result: Any) -> str:
+    """Return that the sweep is to be repeated where the runs have other moduli or times."""
+    fitted = [one for name, one in result.declared_parameters.items() if name in OF_SWEEP]
+    if not any(differ(one.ci95, result.tolerance) for one in fitted if not one.is_open):
+        return ""
+    return "Repeat the frequency sweep on the loading of these runs."
 
 
 def _fastest(records: Sequence[RunRecord]) -> str:

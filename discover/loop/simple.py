@@ -13,6 +13,7 @@ from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
 from discover.statistics.residual import fast_part
+from discover.words import significant
 
 # Effect that is all that such a material has; another law stands for itself
 _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
@@ -61,7 +62,7 @@ def _result(
     effect = _EFFECT.get(material.law, material.law)
     stage = Stage(
         effect, "constitutive", parameters, (), after, 0.0, material.latex,
-        "least squares, compared with laws that relax by BIC", CHECKS[material.kind],
+        "least squares, compared with laws that relax by BIC", check_of(material),
     )  # fmt: skip
     values = {one.name: one.value for one in material.constants}
     explanation = Explanation((effect,), probability, after, {effect: values})
@@ -94,9 +95,18 @@ def _predicted(task: Task, material: SimpleMaterial, runs: Sequence[Run]) -> np.
     return np.stack([first, second])
 
 
-CHECKS = {
-    "yield_stress": "Creep just below and just above τ_y: it shows whether the material flows.",
+def check_of(material: SimpleMaterial) -> str:
+    """Return what to measure next of a material."""
+    if material.kind != "yield_stress":
+        return _CHECKS[material.kind]
+    first, *_ = material.constants
+    low, high = first.ci95 or (first.value, first.value)
+    ends = (significant(end, 2) for end in (_BELOW * low, high / _BELOW))
+    return f"Creep at {' and '.join(ends)} Pa, below and above τ_y: does it flow?"
+
+
+_BELOW = 0.9  # Stress of a creep over the yield stress, far enough from it to be told in an hour
+_CHECKS = {
     "viscous": "N1, or a start-up: a constant viscosity alone does not show elasticity.",
     "solid": "Creep or relaxation over a longer time: it shows whether the material flows.",
 }
-"""What to measure next of each material."""

@@ -22,7 +22,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from discover.compilation_cache import is_ours_alone
+from discover.compilation_cache import count_program, is_ours_alone
 
 _LIBRARIES = ("jax", "jaxlib", "equinox", "diffrax", "optimistix", "lineax", "numpy", "scipy")
 _MAGIC = b"discover-program-1\n"
@@ -108,13 +108,14 @@ def save_program(file: Path, nesting: Any, exported: bytes) -> None:
 
 def load_program(file: Path) -> tuple[Any, bytes] | None:
     """Return nesting and program; None where there is none, or it is cut short or altered."""
-    try:
+    data = b""
+    with suppress(OSError):
         data = file.read_bytes()
-    except OSError:
-        return None
     start = len(_MAGIC) + 32
     body = data[start:]
-    if data[: len(_MAGIC)] != _MAGIC or hashlib.sha256(body).digest() != data[len(_MAGIC) : start]:
+    whole = _MAGIC + hashlib.sha256(body).digest() == data[:start]
+    count_program(whole)
+    if not whole:
         return None
     head, _, exported = body.partition(b"\n")
     return json.loads(head), exported

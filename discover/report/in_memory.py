@@ -19,8 +19,9 @@ from discover.loop.loop_result import LoopResult
 from discover.loop.runs import record_runs
 from discover.plain_numbers import json_text
 from discover.report.comparison.report import write_comparison
+from discover.report.first_screen import answer_screen
 from discover.report.loop import write_loop
-from discover.report.page import answer_screen, made_by, render
+from discover.report.page import made_by, render
 from discover.report.plots.comparison.flows import drawn_records
 from discover.report.plots.loop.runs import FITTED_LAW, drawn_runs
 from discover.report.plots.style import Picture, picture

@@ -12,7 +12,8 @@ from discover.loop.parts import LawFit
 from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by
 from discover.plain_numbers import json_text
 from discover.protocols.kinematics import ONLY_STATES
-from discover.report.page import answer_screen, made_by, render, safe_name
+from discover.report.first_screen import answer_screen
+from discover.report.page import made_by, render, safe_name
 from discover.report.plots.loop.residual import (
     by_mode_picture,
     residual_picture,

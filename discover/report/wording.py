@@ -1,8 +1,10 @@
-"""Numbers and conclusions in words."""
+"""Numbers and conclusions in words, and how they are set."""
 
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+
+from markupsafe import Markup, escape
 
 from discover import words
 from discover.comparison.outcome import LearnerOutcome
@@ -126,3 +128,54 @@ def free_form_sentence(found: FreeForm) -> str:
     shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
     what = _WHAT[found.slot].format(variable=found.variable)
     return f"{what}{shape}, with {effects} explains the residual"
+
+
+_TOGETHER = re.compile(
+    r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/|°C)|(?<=Pa) (?=s)"
+    r"|(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=×|1/|Pa|s\b|%)|(?<=×) |(?<=% CI) |(?<=%) (?=CI\b)|(?<=\() "
+)
+
+
+def unbroken(text: str) -> str:
+    """Return text whose numbers keep to one line with their units and symbols."""
+    whole = _TOGETHER.sub("\N{NO-BREAK SPACE}", in_units(text))
+    return whole.replace("–", "–\N{WORD JOINER}")
+
+
+def in_units(text: str) -> str:
+    """Return text whose reciprocal units cannot be read as a number: 3 s⁻¹ for 3 1/s."""
+    return re.sub(r" 1/(s|Pa)\b", "\N{NARROW NO-BREAK SPACE}\\1⁻¹", text)
+
+
+_LOWERED = re.compile(r"(?<!\w)([^\W\d_]\u0307?)_([^\W_]|\+)(?!\w)")
+
+
+def subscripts(text: str) -> Markup:
+    """Return text, escaped, with what follows a letter and an underscore lowered."""
+    return Markup(_LOWERED.sub(r"\1<sub>\2</sub>", str(escape(text))))
+
+
+_NUMERALS = {
+    "Wi": "Weissenberg number: mean relaxation time λ times the largest shear rate",
+    "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
+}
+
+
+def explained(text: str) -> Markup:
+    """Return text, escaped, whose dimensionless numbers say what they are where one points."""
+
+    def said(found: re.Match[str]) -> str:
+        return f'<abbr title="{_NUMERALS[found[0]]}">{found[0]}</abbr>'
+
+    return Markup(re.sub(rf"\b({'|'.join(_NUMERALS)})(?=\s=)", said, str(subscripts(text))))
+
+
+def in_cell(text: str) -> str:
+    """Return a number that breaks between a power of ten and its unit, or an interval before it.
+
+    Words without a number break anywhere.
+    """
+    if not any(map(str.isdigit, text)):
+        return text
+    whole = unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace(")\N{NO-BREAK SPACE}", ") ")
+    return re.sub("(×\N{NO-BREAK SPACE}10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)\N{NO-BREAK SPACE}", r"\1 ", whole)

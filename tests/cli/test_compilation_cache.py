@@ -3,10 +3,13 @@
 import subprocess
 import sys
 import zlib
+from collections import Counter
 
 import pytest
 
+from discover import compilation_cache
 from discover.compilation_cache import remove_cut_short
+from discover.programs.store import load_program, save_program
 
 SIMULATE = """
 import sys
@@ -50,3 +53,13 @@ def test_whole_programs_are_left_and_broken_ones_go(tmp_path):
     remove_cut_short(tmp_path)
     left = sorted(path.name.partition("-")[0] for path in tmp_path.glob("*-cache"))
     assert left == ["jit_a", "web"]
+
+
+def test_programs_to_compile_are_counted_among_those_that_were_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(compilation_cache, "_found", Counter())
+    assert compilation_cache.compiled_share() == 0.0
+    assert load_program(tmp_path / "one") is None
+    assert compilation_cache.compiled_share() == 1.0
+    save_program(tmp_path / "one", None, b"code")
+    assert load_program(tmp_path / "one") == (None, b"code")
+    assert compilation_cache.compiled_share() == 0.5

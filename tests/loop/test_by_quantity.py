@@ -12,7 +12,7 @@ from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread
 from discover.loop.fitted_range import range_of
 from discover.loop.from_posterior import Ended
-from discover.loop.parts import ErrorPair, Stage
+from discover.loop.parts import ErrorPair, Stage, StageParameter
 from discover.loop.runs import RunRecord
 from discover.loop.sentences import what_to_measure_next
 
@@ -37,7 +37,7 @@ def result(records, left=0.06, **more):
         "spread_of_laws": {"N1": Spread(0.6, 0.8), "uniaxial": Spread(1.2, 1.3)},
         "verdict": "unexplained", "material": None, "stages": (), "tolerance": 0.05,
         "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
-        "remaining": {},
+        "remaining": {}, "declared_parameters": {},
     }  # fmt: skip
     return SimpleNamespace(**(found | more))
 
@@ -136,7 +136,7 @@ def test_each_quantity_has_the_error_of_its_own_unseen_runs():
 def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
     close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09)}
     told = errors_by_quantity(result(FITTED, spread_of_laws=close))
-    assert told["N1"].note == "not measured; if the law is right"
+    assert told["N1"].note == "not measured: spread of laws that fit as well"
     assert told["N2"].note == "−9 % of N1 by this law"
     assert told["N2"].missing == "not measured"
     assert not told["N2"].is_known
@@ -162,7 +162,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     edge = stage("edge_fracture", (0.01, 0.03), 5.0, "Watch the edge; repeat with another cone.")
     slip = stage("wall_slip", (0.0, 0.03), 9.0, "Repeat with another gap.")
     told = what_to_measure_next(result(FITTED, stages=(slip, edge)))
-    assert told.startswith("To confirm edge fracture, ")
+    assert told.startswith("To confirm torque loss with strain, ")
     assert told.endswith("watch the edge; repeat with another cone.")
     told = what_to_measure_next(close())
     assert told == "Measure N1 at 1 1/s: equally good laws differ by 60 %."
@@ -180,6 +180,19 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(close(spread_of_laws=same, discrepancy=None))
     assert again.startswith("Repeat fast with another gap")
+
+
+def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
+    factor = StageParameter(0.52, (0.04, 0.79), "1")
+    again = "Repeat the frequency sweep on the loading of these runs."
+    for name in ("modulus_factor", "relaxation_time_factor"):
+        assert what_to_measure_next(close(declared_parameters={name: factor})) == again
+    # the first is next to one, within the tolerance of 10 %, and the last is no value
+    for ends in ((0.5, 0.92), (0.4, 1.1), (0.001, 60.0)):
+        same = close(declared_parameters={"modulus_factor": replace(factor, ci95=ends)})
+        assert what_to_measure_next(same) != again
+    alone = close(declared_parameters={"modulus_Pa": replace(factor, value=0.5)})
+    assert what_to_measure_next(alone) != again  # there is no sweep
 
 
 def close(records=FITTED, **more):

@@ -1,5 +1,6 @@
 """Records that hold no signal: no effect is named, and nothing is said to explain them."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -58,6 +59,10 @@ def test_pure_noise_is_no_signal(seed, declared):
     assert sentences[0].startswith("No signal")
     assert "explains" not in sentences[0]
     assert "sensor is connected" in result.answer.next_test
+    said = re.search(r"only noise of (.*)–(.*) Pa rms, so no law", result.answer.headline)
+    assert said
+    # that of each run, which median differences of 100 samples tell to some 10 %
+    assert [float(end) for end in said.groups()] == pytest.approx([5.0, 5.0], rel=0.35)
 
 
 @BOTH

@@ -5,10 +5,11 @@ import pytest
 from independent import Giesekus
 
 import discover as dc
-from discover.answer.simple_material import recognise
+from discover.answer.simple_material import material_of, recognise
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
 from discover.loop import run_loop
+from discover.loop.simple import check_of
 from discover.protocols import oscillations as oscillations_of
 from discover.protocols import oscillatory_shear, start_up, steady_rates
 
@@ -65,6 +66,12 @@ def test_a_simple_material_is_named_with_its_constants(runs, law, constants):
         low, high = constant.ci95
         # twice the 95 % interval: six worlds of one seed each, three constants
         assert abs(constant.value - truth) < 2.0 * (high - low)
+
+
+def test_a_yield_stress_is_tested_by_creep_at_stresses_below_and_above_its_interval():
+    fluid = material_of("herschel_bulkley", (12.0, 3.0, 0.5), [(11, 13), (2, 4), (0.4, 0.6)], 0.01)
+    # a tenth below the one end and above the other, in two digits
+    assert check_of(fluid) == "Creep at 9.9 and 14 Pa, below and above τ_y: does it flow?"
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 0.9])

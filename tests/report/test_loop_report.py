@@ -220,7 +220,7 @@ def test_many_aliases_are_counted_and_not_recited():
     stage = replace(loop_result().stages[0], aliases=aliases)
     following = replace(loop_result(), stages=(stage,)).answer.next_test
     assert "2 more" in following
-    assert "edge fracture" not in following
+    assert "torque loss" not in following
 
 
 def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(tmp_path, no_pictures):

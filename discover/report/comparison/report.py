@@ -13,7 +13,8 @@ from discover.learners.registry import learner_title
 from discover.plain_numbers import json_text
 from discover.report.comparison import tables
 from discover.report.comparison.tables import learner_lines
-from discover.report.page import Missing, answer_screen, attempt, made_by, render, safe_name
+from discover.report.first_screen import answer_screen
+from discover.report.page import Missing, attempt, made_by, render, safe_name
 from discover.report.plots.comparison.flows import flow_picture, start_up_picture, training_picture
 from discover.report.plots.comparison.selection import (
     error_map_picture,

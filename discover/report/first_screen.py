@@ -1,0 +1,197 @@
+"""The first screen of a page: law, constants, expected errors, what to measure next."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from discover import words
+from discover.answer import Answer, Constant, Suspect, sentences
+from discover.answer import modes_in_words as modes
+from discover.effects import StateEffect
+from discover.equations import FORMATS, Equation
+from discover.equations.spelling.markup import law_element
+from discover.errors import InputError
+from discover.plain_numbers import json_text
+from discover.report.mathtext import formula
+from discover.report.wording import in_cell, unbroken
+
+# Buttons, with the formats that they copy; JSON is that of the answer
+_COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
+
+
+def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
+    """Return what the template ``answer.html`` shows; None shows nothing."""
+    if answer is None:
+        return None
+    headline, symbols = unbroken(sentences.law(answer)), [one.symbol for one in answer.constants]
+    if (answer.equation or answer.shown) is not None:
+        # terms as the equation in Pa and s has them: over the stress of a mode in units of G
+        for i, one in enumerate(answer.constants):
+            if one.is_term:
+                symbols[i] = one.symbol.replace("σ", "τ")
+                headline = headline.replace(one.symbol, symbols[i])
+    reduced = modes.reduced_to(answer)
+    shifted = [
+        ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)} than at {reduced}",
+         words.significant(one, 3), "") for at, one in modes.shifts(answer)
+    ]  # fmt: skip
+    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
+    clock = "; times on the instrument's clock" if timed and answer.shift_factors else ""
+    return {
+        "answer": answer,
+        "title": (answer.title or answer.instead.lower()).partition(":")[0],
+        "headline": headline,
+        "quality": unbroken(sentences.quality(answer)),
+        "errors": sentences.error_title(answer).lower(),
+        "open": not answer.title or answer.adequate is False,
+        "law": _typeset(answer),
+        "constants": [
+            *((symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
+              for symbol, one in zip(symbols, answer.constants, strict=True)),
+            *shifted,
+        ],
+        "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
+        "suspected": sentences.SUSPECTED.lower() + clock,
+        "expected": list(map(_expected, sentences.errors(answer))) if answer.title else (),
+        "copies": (copies := _copies(answer) if answer.title else []),
+        "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
+        "missing": _not_there(copies),
+        "behind": unbroken(answer.alternative),
+        "next_test": unbroken(answer.next_test),
+    }  # fmt: skip
+
+
+def _said(one: Constant) -> str:
+    """Return what a constant is, and that its value is at an end of what is possible."""
+    skewed = "at an end of its interval" if one.is_skewed or one.bound else ""
+    at_end = "at its physical limit" if one.at_limit else skewed
+    return "; ".join(filter(None, [one.said, at_end]))
+
+
+def _expected(row: sentences.Row) -> sentences.Row:
+    """Return a row of expected errors as its cells show it."""
+    return sentences.Row(
+        row.symbol, unbroken(row.note), in_cell(row.inside), in_cell(row.beyond),
+        unbroken(row.beyond_at), row.is_known,
+    )  # fmt: skip
+
+
+def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
+    """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
+    title = words.effect_title(one.effect)
+    if one.amplitude is None or not has_size:
+        return title, "", "" if has_size else sentences.NOT_SEPARABLE, ""
+    said = one.amplitude.meaning if one.amplitude.unit == "%" else ""
+    said = said if one.is_established else "; ".join(filter(None, [said, "may be zero"]))
+    return title, said, in_cell(one.amplitude.number), in_cell(one.amplitude.interval)
+
+
+def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
+    """Return why buttons are grey, in one sentence."""
+    grey = [one for one in copies if not one["text"]]
+    if not grey:
+        return ""
+    reason = grey[0]["reason"].partition(". ")[0].rstrip(".").rpartition(": ")[2]
+    names = words.listed([one["name"] for one in grey])
+    if any(one["name"] in reason for one in grey):
+        return f"{reason}."
+    return f"Cannot be exported to {names}: {reason[:1].lower()}{reason[1:]}."
+
+
+def _typeset(answer: Answer) -> str:
+    equation = answer.equation or answer.shown
+    lines = answer.written.get("formula", "").splitlines()
+    if equation is None:
+        return _formulas(lines)
+    rest = any(line.startswith("h = ") for line in lines)
+    return _law(_rounded(equation, answer), rest) + _formulas(lines)
+
+
+def _rounded(equation: Equation, answer: Answer) -> Equation:
+    """Return an equation with the digits that the intervals leave, three at most."""
+
+    def short(value: float) -> float:
+        digits = next((one.digits for one in answer.constants if np.isclose(one.value, value)), 3)
+        return float(f"{value:.{digits}g}")
+
+    def all_short(values: Mapping[str, float]) -> dict[str, float]:
+        return {name: short(value) for name, value in values.items()}
+
+    terms = tuple(
+        replace(term, coefficient=short(term.coefficient), inner=all_short(term.inner))
+        for term in equation.terms
+    )
+    named = equation.named
+    if named is not None:
+        named = replace(named, constants=tuple(map(all_short, named.constants)))
+    return replace(equation, terms=terms, named=named)
+
+
+_LARGE = 15.0  # Size in points of an equation that the answer rests on
+
+
+def _formulas(lines: Sequence[str]) -> str:
+    """Return equations in LaTeX, each in a paragraph that breaks between its parts."""
+    parts = [
+        [formula(part, f"answer{i}_{k}", _LARGE) for k, part in enumerate(line.split(r",\quad"))]
+        for i, line in enumerate(lines)
+    ]
+    return "".join(f'<p class="scroll">{" &emsp; ".join(one)}</p>' for one in parts)
+
+
+def _law(equation: Equation, rest: bool = False) -> str:
+    """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
+    count = len(equation.modulus)
+    solvent = equation.solvent_viscosity > 0.0
+    try:
+        text = law_element(
+            equation.terms, equation.linear_relaxation, equation.named, count, solvent, rest
+        )
+        # what a state of the whole fluid does stands below the law of a mode
+        index = "_k" if count > 1 else ""
+        parts = [
+            one.equation.replace("_k", index) + _at_rest(one.states, part.own)
+            for one, part in zip(equation.spelled_states, equation.states, strict=True)
+        ]
+        return text + _formulas(_scaled_once(parts))
+    except InputError:  # nobody said how a law of their own is written
+        return ""
+
+
+_SCALED = re.compile(r"(\S+) \\to (.+?)(?:\\,)?\s*\1")
+
+
+def _scaled_once(equations: Sequence[str]) -> list[str]:
+    """Return equations of states, with one product for what several of them scale."""
+    parted = [one.partition(r",\quad") for one in equations]
+    found = [_SCALED.fullmatch(first) for first, _, _ in parted]
+    scaled = {one[1] for one in found if one}
+    if len(scaled) != 1 or not all(found) or len(found) < 2:
+        return list(equations)
+    product = r"\,".join(one[2] for one in found if one)
+    (what,) = scaled
+    return [rf"{what} \to {product}\,{what}", *(rest for _, _, rest in parted)]
+
+
+def _at_rest(states: Sequence[str], effect: StateEffect) -> str:
+    """Return what the states of a fluid are at rest, as it goes on behind their equation."""
+    index = "" if effect.levels == 1 else "_i"
+    rest = rf"{index} = {effect.rest:g}\ \mathrm{{at\ rest}}"
+    return "".join(rf",\quad {state}{rest}" for state in states)
+
+
+def _copies(answer: Answer) -> list[Mapping[str, str]]:
+    """Return the law in every format that a button copies, or why it is not there."""
+    found = []
+    for name, form in _COPIED.items():
+        text, reason = answer.written.get(form, ""), "It cannot be written out."
+        if (equation := answer.equation or answer.classical) is not None:
+            try:
+                text = FORMATS[form](equation)
+            except InputError as error:
+                reason = str(error)
+        found.append({"name": name, "text": text, "reason": reason})
+    return [*found, {"name": "JSON", "text": json_text(answer.to_json()), "reason": ""}]
