@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
@@ -100,6 +101,10 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
 
+# Steps in a row that are pieces of fewer: how many at least, into how many of one length they go,
+# how far their widths may differ for rounding, and rates from a straight line
+_MANY_IN_A_ROW, _SHARES, _ALIKE, _STRAIGHT = 8, 4, 1e-6, 1e-10
+
 # Least sizes of arrays that data sets share; of runs where they have no more steps than that
 _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
 
@@ -110,6 +115,7 @@ class TransientFlows(eqx.Module):
     `times`: step ends and middles in turn, in s; negative in what came before the record.
     `strain_before`: total strain of the sample before each run.
     `last_step`: position of the last sample of each run among step ends; padding follows.
+    `pieces`: of one length in which each step is followed.
     `steps`: steps of the rate whose instants are fitted, or were; None where there is none.
     `cycle`: positions among step ends of the last cycle before the first sample; −1 where the run
         has no periodic start.
@@ -122,11 +128,10 @@ class TransientFlows(eqx.Module):
     strain_before: Float[Array | np.ndarray, " runs"]
     cycle: Int[Array | np.ndarray, "runs 2"]
     last_step: Int[Array | np.ndarray, " runs"]
+    pieces: Int[Array | np.ndarray, "runs s"]
     kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
-    # whether vectors may choose their steps while the rate is a straight line
-    own_widths: bool = eqx.field(static=True, default=True)
 
     def in_shared_shape(self) -> "TransientFlows":
         """Return these runs padded to one of few shapes, so that data sets share programs."""
@@ -145,6 +150,7 @@ class TransientFlows(eqx.Module):
             times=np.concatenate([times, later], axis=1),
             commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), half_steps),
             sample_index=_longer(self.sample_index, samples, "edge"),
+            pieces=np.maximum(_longer(self.pieces, step_ends - 1), 1),
             steps=self.steps and self.steps.padded(_rounded(self.steps.start.shape[1], 1)),
         )
         return jax.tree.map(lambda values: _more_runs(values, runs), longer)
@@ -177,8 +183,7 @@ class Steps(NamedTuple):
 
     `strain`, `phase`: the most of a step. `pieces`: into how many each is then cut, of all runs or,
     at a given rate in time, of each. `longest`: in s. `relaxation_time`: longest of the fluid, in
-    s; see `make_grid`. `own`: whether vectors may choose steps of their own, which err by 1e-6 of
-    the stress.
+    s; see `make_grid`.
     """
 
     strain: float = 0.25
@@ -186,7 +191,6 @@ class Steps(NamedTuple):
     phase: float = 0.15
     longest: float = np.inf
     relaxation_time: float | None = None
-    own: bool = True
 
 
 def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlows:
@@ -204,18 +208,19 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         grid, _ = make_grid(run.protocol, anchors, relaxation_time=settles, **limits)
         if settles is None and len(grid) > max(_LONG, 2 * len(anchors)):
             grid, _ = make_grid(run.protocol, anchors, growth=_GROWTH, **limits)
-        grids.append(cut(grid, np.searchsorted(grid, run.time), int(pieces)))
-    n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
+        grid, index = cut(grid, np.searchsorted(grid, run.time), int(pieces))
+        grids.append(_in_pieces(grid, index, run))
+    n_steps = max(2, *(len(grid) for grid, *_ in grids))
     n_samples = max(len(run) for run in runs)
     cycles = [
         np.searchsorted(grid, run.protocol.cycle) if np.ptp(run.protocol.cycle) else (-1, -1)
-        for run, (grid, _) in zip(runs, grids, strict=True)
+        for run, (grid, *_) in zip(runs, grids, strict=True)
     ]
     cycle_steps = int(max(end - start for start, end in cycles))
     if cycle_steps:
         n_steps = max(n_steps, *(int(start) + cycle_steps + 1 for start, _ in cycles))
     rows = []
-    for run, cycle, (grid, index) in zip(runs, cycles, grids, strict=True):
+    for run, cycle, (grid, index, pieces) in zip(runs, cycles, grids, strict=True):
         spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
         padded = np.concatenate([grid, grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)])
         half = np.empty(2 * n_steps - 1)
@@ -234,6 +239,7 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
                 run.strain_before,
                 np.asarray(cycle),
                 np.asarray(len(grid) - 1),
+                np.pad(pieces, (0, n_steps - 1 - len(pieces)), constant_values=1),
             )
         )
     columns = [np.stack(column) for column in zip(*rows, strict=True)]
@@ -242,8 +248,39 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
         steps=rate_steps(runs),
         cycle_steps=cycle_steps,
-        own_widths=steps.own,
     )
+
+
+def _in_pieces(
+    grid: Float[np.ndarray, " s"], index: Int[np.ndarray, " n"], run: Run
+) -> tuple[Float[np.ndarray, " m"], Int[np.ndarray, " n"], Int[np.ndarray, " pieces"]]:
+    """Return steps of which several in a row of a grid are pieces, and where samples stand.
+
+    Those are of one length, between two samples, and the commanded rate is a straight line in them.
+    The pieces of a step double in number, for it may begin with a jump, up to a share of them all.
+    """
+    if len(grid) < _MANY_IN_A_ROW:
+        return grid, index, np.ones(len(grid) - 1, np.int64)
+    width, rate = np.diff(grid), shear_rates(run.protocol, grid)
+    in_a_row = np.abs(np.diff(width)) <= _ALIKE * width[1:]
+    bend = np.abs(rate[2:] - 2.0 * rate[1:-1] + rate[:-2])
+    in_a_row &= bend <= _STRAIGHT * (np.abs(rate[2:]) + np.abs(rate[:-2]))
+    in_a_row = np.concatenate([[False], in_a_row, [False]])
+    in_a_row[index] = False
+    for step in run.rate_steps:  # one that is fitted is no straight line
+        in_a_row[(grid >= step.start) & (grid <= step.end)] = False
+    ends = np.flatnonzero(~in_a_row)
+    kept = ~in_a_row
+    for first, end in pairwise(ends):
+        if end - first < _MANY_IN_A_ROW:
+            kept[first:end] = True
+            continue
+        place, most = first, (end - first) // _SHARES
+        while place < end:
+            kept[place] = True
+            place += min(max(place - first, 1), most)
+    places = np.flatnonzero(kept)
+    return grid[places], np.searchsorted(places, index), np.diff(places)
 
 
 class StressFlows(eqx.Module):

@@ -37,7 +37,6 @@ from discover.forward.side_by_side import (
     StressCode,
     StressSideBySide,
     code_of,
-    intervals,
 )
 from discover.laws import LAWS
 from discover.programs.threads import on_device
@@ -67,8 +66,6 @@ class Program:
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
-        # whether runs have intervals in which vectors choose their steps
-        self._chooses_steps = MadeOnce(lambda part: bool(np.any(intervals(part)[0] > 1)))
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors of runs of one control at once."""
@@ -79,7 +76,7 @@ class Program:
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
         choices = {}
         if isinstance(part, TransientFlows):
-            choices = {"chooses": self._chooses_steps(part), "cycles": part.cycle_steps > 0}
+            choices = {"cycles": part.cycle_steps > 0}
         kind = (
             type(part),
             jax.tree.structure(arrays),
@@ -100,9 +97,9 @@ class Program:
             own = self._steady_rates, self._recorded_steady
             return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
         if control is PeriodicFlows:
-            code, cycles = code_of(PeriodicCode, *given), {"chooses": False, "cycles": True}
+            code = code_of(PeriodicCode, *given)
             own = self._periodic_rates, self._given_way, self._moduli_recorded
-            in_cycles = partial(code_of, Kernel, *given, **cycles)
+            in_cycles = partial(code_of, Kernel, *given, cycles=True)
             return PeriodicSideBySide(self.fluid, code, in_cycles, *own, made_from)
         if control is StressFlows:
             code = code_of(StressCode, *given)

@@ -57,7 +57,7 @@ def stresses_of_laws(
     used = TermLibrary(tuple(used))
     relaxes = base.linear_relaxation
     fluids = [Fluid.dimensionless(expansion_of(law, used, relaxes, base)) for law in laws]
-    batch = make_batch(runs, strain_step, longest=longest_step(base), own=False)
+    batch = make_batch(runs, strain_step, longest=longest_step(base))
     return observed(fluids, batch)
 
 

@@ -128,7 +128,7 @@ def _halved(fluid: Fluid, run: Run, rtol: float, atol: float) -> Float[np.ndarra
     """
     settles, pieces, known = fluid.settling_time, (1, 2), []
     while True:
-        runs, limits = [run] * len(pieces), {"relaxation_time": settles, "own": False}
+        runs, limits = [run] * len(pieces), {"relaxation_time": settles}
         batch = make_batch(runs, STRAIN_STEP, pieces=pieces, **limits)
         coarse, found = [*known, *components([fluid], batch)[0, :, :, :4]][-2:]
         if np.all(np.isfinite(found)):

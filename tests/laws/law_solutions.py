@@ -85,7 +85,7 @@ def observed(law: str, flow: str, pieces: int = 1, coarser: float = 1.0) -> np.n
     """Return what the software says is observed, with steps cut in pieces, or longer ones."""
     made = make_law(law, CONSTANTS[law])
     solvent = SOLVENT if flow == "imposed stress" else 0.0
-    how = {"pieces": pieces, "phase": 0.15 * coarser, "own": False}
+    how = {"pieces": pieces, "phase": 0.15 * coarser}
     fluid = Fluid(made, 1.0, 1.0, solvent)
     found = observed_in(fluid, FLOWS[flow], TIMES[flow], STRAIN_STEP * coarser, **how)
     return found if flow in ("start-up", "oscillation") else found[:, :1]

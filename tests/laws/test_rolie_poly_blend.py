@@ -57,7 +57,7 @@ def fluid(modulus=1.0, time=1.0, **changed):
 def solved(law, rate, strain_step, kind="shear", times=TIMES):
     """Return σ in a start-up, (n, 4)."""
     run = bare_run(in_flow(start_up(rate), kind), times)
-    return components([law], make_batch([run], strain_step, own=False))[0, 0, :, :4]
+    return components([law], make_batch([run], strain_step))[0, 0, :, :4]
 
 
 def by_the_loop(protocol, rate, modulus=(1.0,), time=(1.0,), times=TIMES, **columns):

@@ -38,7 +38,7 @@ def fluid(ratio):
 def test_steps_much_longer_than_a_mode_and_its_retraction_follow_both():
     """The fastest mode relaxes in 1/500 of a step, and retracts in 1/5,000; it ran away."""
     wanted = exact(0.1, 0.3)
-    found = observed_in(fluid(0.1), start_up(0.3), SAMPLES, own=False)[:, 0]
+    found = observed_in(fluid(0.1), start_up(0.3), SAMPLES)[:, 0]
     np.testing.assert_allclose(found, wanted, atol=1e-3 * np.max(wanted))
 
 
@@ -51,8 +51,8 @@ def test_steps_that_adapt_follow_them_to_the_tolerance():
 
 @pytest.mark.parametrize("ratio", [0.01, 0.5])
 def test_steps_are_cut_until_cutting_them_changes_nothing(ratio):
-    pieces = pieces_in_time(fluid(ratio), [RUN], 0.2, own=False)
-    found = observed_in(fluid(ratio), start_up(0.3), SAMPLES, 0.2, pieces=pieces, own=False)[:, 0]
+    pieces = pieces_in_time(fluid(ratio), [RUN], 0.2)
+    found = observed_in(fluid(ratio), start_up(0.3), SAMPLES, 0.2, pieces=pieces)[:, 0]
     wanted = exact(ratio, 0.3)
     # a change of 1e-4 on halving bounds the error of a method that converges
     assert np.linalg.norm(found - wanted) < 2e-4 * np.linalg.norm(wanted)

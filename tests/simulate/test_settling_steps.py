@@ -44,7 +44,7 @@ def error(law, time, told):
     """Return the largest error over the largest stress, and the number of steps."""
     parameters, independent = LAWS[law]
     fluid = Fluid(make_law(law, parameters), 1.0, time)
-    batch = make_batch([bare_run(FLOW, TIMES)], STRAIN_STEP, relaxation_time=told, own=False)
+    batch = make_batch([bare_run(FLOW, TIMES)], STRAIN_STEP, relaxation_time=told)
     s12, n1, n2 = observed([fluid], batch)[0, 0].T
     exact = replace(independent, relaxation_time=time).respond(RECORD, TIMES)
     pairs = (s12, exact.sigma12), (n1, exact.N1), (n2, exact.N2)
@@ -70,7 +70,7 @@ def test_what_a_law_adds_to_the_relaxation_does_not_make_steps_unstable():
     times = np.append(0.0, np.geomspace(2e-3, 30.0, 60))
 
     def off(**limits):
-        found = observed_in(fluid, flow, times, own=False, **limits)[:, 0]
+        found = observed_in(fluid, flow, times, **limits)[:, 0]
         return np.max(np.abs(found / steady - (1.0 - np.exp(-3.0 * times / time))))
 
     assert off(relaxation_time=time) < 1e-4

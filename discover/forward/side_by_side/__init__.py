@@ -6,7 +6,7 @@ from discover.forward.side_by_side.periodic import PeriodicCode, PeriodicSideByS
 from discover.forward.side_by_side.predictors import Asked, MadeOnce
 from discover.forward.side_by_side.steady import SteadyCode, SteadySideBySide
 from discover.forward.side_by_side.stress import StressCode, StressSideBySide
-from discover.forward.side_by_side.transients import SideBySide, intervals
+from discover.forward.side_by_side.transients import SideBySide
 
 __all__ = [
     "Asked",
@@ -20,5 +20,4 @@ __all__ = [
     "StressCode",
     "StressSideBySide",
     "code_of",
-    "intervals",
 ]

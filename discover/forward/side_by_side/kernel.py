@@ -12,7 +12,6 @@ from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.code import as_array as _array
 from discover.forward.side_by_side.cycles import Cycles
-from discover.forward.side_by_side.own_widths import OWN, OwnWidths
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER, TRUTH
@@ -21,24 +20,29 @@ from discover.protocols.kinematics import Kinematics
 _COUNTS = ("runs", "steps", "modes", "tabled", "normal")
 # of all modes and lanes: rates, parameters and modes of each vector; and what is written
 _WIDE = ("rate", "shared", "mode", "stress", "felt", "of_modes", "scratch")
-_WHOLE = ("last", "held", "cycle", "flags", "taken")
-_SCALAR = ("width", "whole", "least", "period", "table", "flow", "jump")
+_WHOLE = ("last", "pieces", "cycle", "flags", "taken")
+_SCALAR = ("width", "share", "period", "table", "flow", "jump")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 
 # Where in the scratch array what stands; the last few, and the modes behind them, are the state
 # that is carried from step to step
-_TAKEN, _SUM, _OTHER_SUM = range(3)
-_OWN = range(3, 3 + len(OWN))
-_STATE = _OWN.stop
+_TAKEN, _SUM, _OTHER_SUM, _BEGIN, _MOVED, _STATE = range(6)
 _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
+
+# Pieces of a step from which on it may end early, and by how much a state may then still change
+# until its end: nothing that is seen, as a steady state comes nearer with every piece
+_FEWEST, _STEADY = 8, 1e-9
+
+# A stress over its modulus, and a state of the fluid, of which changes are no longer relative
+_SMALL, _SMALL_STATE = 1e-3, 1e-2
 
 
 class Kernel(Code):
     """Machine code for flows at a given rate in time.
 
-    `steps_taken`: by eight vectors at once, in all calls so far. `chooses`: whether vectors choose
-    widths of steps; if not, all take those of the grid, in less code. `cycles`: whether some runs
-    begin with a periodic state.
+    A step is followed in pieces of one length, until all eight vectors are steady. `steps_taken`:
+    pieces that eight vectors took at once, in all calls so far. `cycles`: whether some runs begin
+    with a periodic state.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -48,17 +52,16 @@ class Kernel(Code):
         fluid: AugmentedFluid,
         found: tuple[Mode, Shared],
         flow: Kinematics | None,
-        chooses: bool,
         cycles: bool,
     ):
         super().__init__(fluid, found, flow)
-        self._chooses, self._begins, self.steps_taken = chooses, cycles, 0
+        self._begins, self.steps_taken = cycles, 0
         self._times_at = self.flags.names.index("times")
         self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._make(fluid, found, flow, chooses, cycles)
+        self._make(fluid, found, flow, cycles)
 
     def __call__(
         self,
@@ -82,8 +85,8 @@ class Kernel(Code):
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * self.size
-        # a step whose width is chosen holds the state three times
-        room = _STATE + 3 * (size - _STATE)
+        # the state stands there twice: as it was before a piece, too
+        room = _STATE + 2 * (size - _STATE)
         room += Cycles.room(self._state_at - _LEVELS, modes, self.size) * self._begins
         scratch = np.empty((room, LANES))
         arrays = given | {
@@ -99,12 +102,10 @@ class Kernel(Code):
         first = [w.load("shared", i) for i in range(self._shared.size)]
         self._parameters = self._shared.tree(first)
         self._on = self._truths()
-        self._next = w.builder.alloca(INTEGER)
-        levels, has_states = range(_LEVELS, self._state_at), self._on["states"]
-        self._held = OwnWidths(self, _OWN, _STATE, levels, self._state_at, has_states)
+        self._moves = w.builder.alloca(INTEGER)
+        self._numbers = w.at((w.counts["modes"], self.size), (self._state_at - _STATE, 1))
         if self._begins:
-            of_modes = (w.counts["modes"], 3 * self.size)
-            room = w.at(of_modes, (3, self._state_at - _STATE), (_STATE, 1))
+            room, has_states = w.at((self._numbers, 2), (_STATE, 1)), self._on["states"]
             self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
         with w.loop(w.counts["runs"]) as run, self._arithmetic.apart():
             self._of_run(run)
@@ -117,9 +118,8 @@ class Kernel(Code):
         size = self._flow.size
         kinematics = [self._splat("flow", w.at((run, size), (i, 1))) for i in range(size)]
         flow = self._flow.tree(kinematics) if size else None
-        for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN, *_OWN):
+        for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN):
             self._keep(0.0, place)
-        w.builder.store(INTEGER(0), self._next)
         self._rest(self._levels, _LEVELS)
         states = w.at((counts["modes"], self.size))
         with w.loop(states) as number:
@@ -131,7 +131,6 @@ class Kernel(Code):
             start, end = cycle
             passes = self._cycles.passes(start, end, last, period, lambda: self._settle(flow))
             with passes as (first, behind, is_run), self._arithmetic.apart():
-                w.builder.store(first, self._next)
                 self._steps(run, first, w.builder.sub(behind, first), flow, is_run)
         else:
             self._steps(run, INTEGER(0), last, flow, TRUTH(1))
@@ -143,13 +142,7 @@ class Kernel(Code):
         """Write so many steps, and what is recorded in them if they are the run's."""
         w, arithmetic = self._w, self._arithmetic
         with w.loop(count) as number, arithmetic.apart():
-            number = w.at((number, 1), (first, 1))
-            if self._chooses:
-                is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
-                with w.builder.if_then(is_next), arithmetic.apart():
-                    self._of_interval(run, number, flow, is_run)
-            else:
-                self._of_grid(run, number, flow, is_run)
+            self._of_interval(run, w.at((number, 1), (first, 1)), flow, is_run)
 
     def _settle(self, flow) -> None:
         """Write what a step needs of modes that were not reached by a step before."""
@@ -165,35 +158,82 @@ class Kernel(Code):
     def _place_of_mode(self, number) -> Any:
         return self._w.at((number, self.size), (self._state_at, 1))
 
-    def _of_grid(self, run, number, flow, is_run) -> None:
-        """Write a step of the grid."""
-        w, steps = self._w, self._w.counts["steps"]
-        half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
-        rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
-        width = self._splat("width", w.at((run, steps), (number, 1)))
-        self._of_step(run, number, flow, rates, width, TRUTH(0))
-        self._record(run, number, is_run)
-
     def _of_interval(self, run, number, flow, is_run) -> None:
-        """Write a step of the grid, or several in which the rate is a straight line."""
-        w, steps = self._w, self._w.counts["steps"]
+        """Write a step in all its pieces, and what is recorded at its end."""
+        w, b, a, steps = self._w, self._w.builder, self._arithmetic, self._w.counts["steps"]
         half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
         rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
-        count, is_held = self._held.steps(run, number, half)
-        w.builder.store(w.at((number, 1), (count, 1)), self._next)
-        first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
-        with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
-            self._of_step(run, number, flow, felt, width, is_held)
+        place = w.at((run, steps), (number, 1))
+        count, share, width = w.load("pieces", place), *(
+            self._splat(name, place) for name in ("share", "width")
+        )  # fmt: skip
+        several = b.icmp_signed(">", count, INTEGER(1))
+        changes = a.in_some(a.compare("!=", rates[0], rates[2]))
+        may_end = b.and_(b.icmp_signed(">=", count, INTEGER(_FEWEST)), b.not_(changes))
+        self._keep(0.0, _BEGIN)
+        b.store(INTEGER(1), self._moves)
+
+        def moves():
+            return b.icmp_signed("!=", b.load(self._moves), INTEGER(0))
+
+        with w.loop(count, moves) as piece, a.apart():
+            begin = self._kept(_BEGIN)
+            end = a.add(begin, share)
+            ways = begin, a.multiply(0.5, a.add(begin, end)), end
+            own = [
+                a.chosen(several, self._rate_at(way, rates), rate)
+                for way, rate in zip(ways, rates, strict=True)
+            ]
+            with b.if_then(may_end), a.apart():
+                self._remember()
+            self._of_step(run, number, flow, own, width)
             if self._series:
-                with w.builder.if_then(self._on["series"]), self._arithmetic.apart():
-                    # the interval before asks what series elements take at the beginning
-                    is_first = self._arithmetic.compare("==", begin, 0.0)
-                    earlier, now = w.load("felt", first), self._kept(_EARLIER)
-                    w.store(self._arithmetic.chosen(is_first, now, earlier), "felt", first)
-        number = w.at((number, 1), (count, 1), (-1, 1))
+                is_first = b.icmp_signed("==", piece, INTEGER(0))
+                is_asked = b.and_(b.and_(self._on["series"], is_run), is_first)
+                with b.if_then(is_asked), a.apart():
+                    self._record_taken(run, number)
+            self._keep(end, _BEGIN)
+            with b.if_then(may_end), a.apart():
+                left = a.divide(a.subtract(1.0, end), share)
+                some = a.in_some(a.compare(">", a.multiply(self._moved(), left), _STEADY))
+                b.store(b.zext(some, INTEGER), self._moves)
         self._record(run, number, is_run)
 
-    def _of_step(self, run, number, flow, rates, width, is_held) -> None:
+    def _rate_at(self, way, rates) -> Any:
+        """Return the rate on the way through a step: the parabola through both ends and middle."""
+        a, (first, middle, last) = self._arithmetic, rates
+        bend = a.subtract(a.add(first, last), a.multiply(2.0, middle))
+        line = a.add(first, a.multiply(way, a.subtract(last, first)))
+        curved = a.multiply(a.multiply(2.0, bend), a.multiply(way, a.subtract(way, 1.0)))
+        return a.add(line, curved)
+
+    def _remember(self) -> None:
+        """Write the state once more, behind it."""
+        w = self._w
+        with w.loop(self._numbers) as number:
+            place = w.at((number, 1), (_STATE, 1))
+            self._keep(self._kept(place), w.at((place, 1), (self._numbers, 1)))
+
+    def _moved(self) -> Any:
+        """Return by how much the state is another than the one remembered, of its own size."""
+        w, a = self._w, self._arithmetic
+        self._keep(0.0, _MOVED)
+
+        def seen(place: Any, scale: Any) -> None:
+            now, before = self._kept(place), self._kept(w.at((place, 1), (self._numbers, 1)))
+            moved = a.divide(a.size(a.subtract(now, before)), scale)
+            self._keep(a.larger(self._kept(_MOVED), moved), _MOVED)
+
+        for place in range(_LEVELS, self._state_at):
+            seen(place, a.add(a.size(self._kept(place)), _SMALL_STATE))
+        with w.loop(w.counts["modes"]) as number, a.apart():
+            at = self._place_of_mode(number)
+            sheared = a.add(a.size(self._kept(w.at((at, 1), (3, 1)))), _SMALL)
+            for i in range(self.size):
+                seen(w.at((at, 1), (i, 1)), sheared if i < 4 else 1.0)
+        return self._kept(_MOVED)
+
+    def _of_step(self, run, number, flow, rates, width) -> None:
         w, counts, write, step = self._w, self._w.counts, self._write, self._step
         shared, on, add = self._parameters, self._on, self._arithmetic.add
         w.store(w.at((w.load("taken", 0), 1), (1, 1)), "taken", 0)
@@ -203,11 +243,11 @@ class Kernel(Code):
         )
         if self._series:
             with w.builder.if_then(on["series"]), self._arithmetic.apart():
-                self._foresee(run, number, flow, width, slow, rates, before, scale_last, is_held)
+                self._foresee(run, number, flow, width, slow, rates, before, scale_last)
         taken = self._kept(_TAKEN)
         self._keep(np.zeros(2), _SUM)
         with w.loop(counts["modes"]) as mode_number, self._arithmetic.apart():
-            mode, weights, stress, at = self._mode(run, number, mode_number, width, slow, is_held)
+            mode, weights, stress, at = self._mode(run, number, mode_number, width, slow)
             after = write(
                 step.of_mode,
                 shared, mode, on, flow, slow, stress, tuple(rates), taken, earlier, weights,
@@ -237,14 +277,14 @@ class Kernel(Code):
         self._keep(taken, _EARLIER)
         self._keep(recorded[()], _RECORDED)
 
-    def _foresee(self, run, number, flow, width, slow, rates, before, scale_last, is_held) -> None:
+    def _foresee(self, run, number, flow, width, slow, rates, before, scale_last) -> None:
         """Write what series elements take in a step."""
         w, write, step, add = self._w, self._write, self._step, self._arithmetic.add
         shared, on, earlier = self._parameters, self._on, self._kept(_EARLIER)
         sums = (_SUM, _OTHER_SUM)
         self._keep(np.zeros(2), _SUM)
         with w.loop(w.counts["modes"]) as mode_number, self._arithmetic.apart():
-            mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow, is_held)
+            mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow)
             rate = add(rates[0], earlier)
             found = write(step.foreseen, shared, mode, on, flow, slow, stress, rate, weights)
             for place, value in zip(sums, found, strict=True):
@@ -256,12 +296,12 @@ class Kernel(Code):
         )  # fmt: skip
         self._keep(taken[()], _TAKEN)
 
-    def _mode(self, run, number, mode_number, width, slow, is_held):
+    def _mode(self, run, number, mode_number, width, slow):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, builder, counts = self._w, self._w.builder, self._w.counts
         mode = self._tree("mode", self._of_mode, mode_number)
         untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
-        own = builder.or_(builder.or_(self._on["own weights"], untabled), is_held)
+        own = builder.or_(self._on["own weights"], untabled)
         # past the table's end its first row is read, and not used
         row = builder.select(untabled, INTEGER(0), mode_number)
         tabled = w.at((run, counts["steps"]), (number, 1))
@@ -289,32 +329,34 @@ class Kernel(Code):
                 factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
                 self._record_modes(at, factor, self._state_at, self.size)
 
+    def _record_taken(self, run, number) -> None:
+        """Write what series elements take at the beginning of a step: the mean of both sides."""
+        w, a = self._w, self._arithmetic
+        at, now = (
+            w.at((run, w.at((self._w.counts["steps"], 1), (1, 1))), (number, 1)),
+            self._kept(_EARLIER),
+        )
+        mean = a.multiply(0.5, a.add(w.load("felt", at), now))
+        is_start = w.builder.icmp_signed("==", number, INTEGER(0))
+        w.store(a.chosen(is_start, now, mean), "felt", at)
+
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""
         w, a, steps = self._w, self._arithmetic, self._w.counts["steps"]
         at = w.at((run, w.at((steps, 1), (1, 1))))
         rate = w.load("rate", w.at((run, w.at((steps, 2), (1, 1)))))
-        felt = a.add(rate, w.load("felt", w.at((at, 1), (1, 1))))
+        felt = a.add(rate, w.load("felt", at))
         beside = self._write(self._step.beside, self._parameters, self._on, flow, felt)[()]
         w.store(a.lanes(beside), "stress", at)
         w.store(a.lanes(felt), "felt", at)
 
     def _beside(self, run, number, flow) -> None:
         """Write the felt rate at the end of a step, and the recorded stress with what is beside."""
-        w, builder, a = self._w, self._w.builder, self._arithmetic
-        steps = w.counts["steps"]
-        ends = w.at((steps, 1), (1, 1))
-        # at a step's end the mean of both sides; it is still the rate taken that `felt` holds
-        at = w.at((run, ends), (number, 1), (1, 1))
-        taken = w.load("felt", at)
-        # behind the last step that is taken nothing is known
-        is_last = builder.icmp_signed("==", w.at((number, 1), (1, 1)), w.load("last", run))
-        following = w.load(
-            "felt", w.at((at, 1), (builder.select(is_last, INTEGER(0), INTEGER(1)), 1))
-        )
+        w, a, steps = self._w, self._arithmetic, self._w.counts["steps"]
+        at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         rate = w.load("rate", w.at((run, w.at((steps, 2), (1, 1))), (number, 2), (2, 1)))
-        mean = a.multiply(0.5, a.add(taken, following))
-        felt = a.add(rate, mean)
+        # it is still what series elements take that `felt` holds
+        felt = a.add(rate, w.load("felt", at))
         beside = self._write(self._step.beside, self._parameters, self._on, flow, felt)[()]
         w.store(a.lanes(a.add(w.load("stress", at), beside)), "stress", at)
         w.store(a.lanes(felt), "felt", at)

@@ -318,9 +318,9 @@ class PeriodicSideBySide(StatePredictor):
             amplitude = strain[lanes].T
             given = packed.of_eight(lanes, len(asked.numbers.modulus)) | {
                 "rate": wave[:, :, None] * amplitude[:, None], "table": np.zeros(WEIGHTS),
-                "last": steps, "held": np.ones(width.shape, np.int64),
+                "last": steps, "pieces": np.ones(width.shape, np.int64),
                 "cycle": np.stack([np.zeros_like(steps), steps], axis=1),
-                "width": width, "whole": width, "least": width, "period": 2.0 * np.pi / frequency,
+                "width": width, "share": np.ones(width.shape), "period": 2.0 * np.pi / frequency,
                 "jump": np.zeros(len(steps)), "flow": flows_of(None),
             }  # fmt: skip
             _, _, of_modes = self._cycles()(len(steps), 0, used, given, normal=True)

@@ -6,7 +6,6 @@ of the rate at instants that are fitted.
 """
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple
 
 import jax
@@ -32,16 +31,10 @@ from discover.programs.lanes import LANES
 # Vectors of the same times from which on weights of the steps are worth a table
 _MANY = 8
 
-# Steps of the grid from which on vectors choose their own, and as how many of them a step may
-# always be long: two halves, extrapolated, err no more than two steps of the grid
-_FEWEST, _ALWAYS = 8, 2.0
-
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 JUMP = 1e-9
 
-_OF_RUNS = (
-    "last", "held", "cycle", "width", "whole", "least", "period", "jump", "flow",
-)  # fmt: skip
+_OF_RUNS = ("last", "pieces", "cycle", "width", "share", "period", "jump", "flow")
 
 
 class _Signals(NamedTuple):
@@ -81,9 +74,9 @@ def _before_runs(thetas: Float[np.ndarray, "lanes p"]) -> Float[np.ndarray, "p l
 class _Runs(NamedTuple):
     """Runs as the kernel takes them, in arrays of NumPy.
 
-    `width`, `jump`: of steps in s, and the width up to which one only marks a jump of the rate.
-    `held`, `whole`, `least`: over how many steps from each on the commanded rate may be a straight
-        line, how long these are, and how short a vector's own may be, in s; see `OwnWidths`.
+    `pieces`, `share`, `width`: how many pieces each step has, and how long one is, over the step
+        and in s.
+    `jump`: width up to which a step only marks a jump of the rate, in s.
     `cycle`, `period`: steps between which the cycle lies that a run's start brings back, the first
         negative where there is none, and its length in s.
     `rate`, `tool_rate`: without effects of the instrument, lanes of the former last, of the latter
@@ -93,79 +86,15 @@ class _Runs(NamedTuple):
     last: np.ndarray  # how many steps of each are taken
     cycle: np.ndarray
     period: np.ndarray
-    held: np.ndarray
+    pieces: np.ndarray
     width: np.ndarray
-    whole: np.ndarray
-    least: np.ndarray
+    share: np.ndarray
     jump: np.ndarray
     flow: np.ndarray  # kinematics of each run
     signals: _Signals  # what effects on rates and signals take
     rate: np.ndarray
     tool_rate: np.ndarray
     in_shear: bool
-    lines: tuple[np.ndarray, np.ndarray]  # from samples to step ends, see `_lines`
-
-
-def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return of each step how many from it on are one interval, its length, and the least step.
-
-    An interval of a straight rate ends at a sample and where a rate jumps; one of few steps is
-    left.
-    """
-    half, rates = np.asarray(part.times), np.asarray(part.commanded_rate)
-    times, sample, last = half[:, ::2], np.asarray(part.sample_index), np.asarray(part.last_step)
-    jump = JUMP * times[:, -1]
-    width = np.diff(times)
-    held = np.ones(width.shape, np.int64)
-    whole, least = width.copy(), width.copy()
-    if not part.own_widths:
-        return held, whole, least
-    behind = np.asarray(part.cycle)[:, 1]
-    for row, (own, at) in enumerate(zip(times, sample, strict=True)):
-        jumps = np.flatnonzero(width[row] <= jump[row])
-        starts = np.searchsorted(own, 0.0)
-        ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
-        ends = ends[ends <= last[row]]
-        for first, end in pairwise(ends):
-            # a cycle is gone through in the same steps again and again
-            if end - first < _FEWEST or first < behind[row]:
-                continue
-            own_rates, own_times = (of[row, 2 * first : 2 * end + 1] for of in (rates, half))
-            line = np.interp(own_times, own_times[[0, -1]], own_rates[[0, -1]])
-            if np.all(np.abs(own_rates - line) <= 1e-10 * np.abs(line)):
-                length = own[end] - own[first]
-                held[row, first], whole[row, first] = end - first, length
-                least[row, first] = _ALWAYS * length / (end - first)
-    return held, whole, least
-
-
-def _lines(
-    times: Float[np.ndarray, "runs s"], sample: np.ndarray
-) -> tuple[np.ndarray, Float[np.ndarray, "runs s 1"]]:
-    """Return between which samples step ends are, and what share of the way, shapes (runs, s, 1).
-
-    Samples behind the last of a shorter run are copies of it.
-    """
-    at_samples = np.take_along_axis(times, sample, axis=1)
-    pairs = zip(at_samples, times, strict=True)
-    before = np.array([np.searchsorted(own, all_, side="right") - 1 for own, all_ in pairs])
-    before = np.clip(before, 0, max(sample.shape[1] - 2, 0))
-    first, second = (
-        np.take_along_axis(at_samples, np.minimum(before + i, sample.shape[1] - 1), axis=1)
-        for i in (0, 1)
-    )
-    width = second - first
-    share = np.where(width > 0.0, (times - first) / np.where(width > 0.0, width, 1.0), 0.0)
-    return before[..., None], np.clip(share, 0.0, 1.0)[..., None]
-
-
-def _between(
-    values: Float[np.ndarray, "runs n lanes"], before: np.ndarray, share: np.ndarray
-) -> Float[np.ndarray, "runs s lanes"]:
-    """Return values at samples as straight lines between these, at all step ends; see `_lines`."""
-    first = np.take_along_axis(values, before, axis=1)
-    behind = np.minimum(before + 1, values.shape[1] - 1)
-    return first + share * (np.take_along_axis(values, behind, axis=1) - first)
 
 
 def _runs(part: TransientFlows) -> _Runs:
@@ -175,8 +104,7 @@ def _runs(part: TransientFlows) -> _Runs:
     rate = np.repeat(commanded[..., None], LANES, axis=-1)
     tool_rate = np.tile(commanded[:, ::2], (LANES, 1, 1))
     times = np.asarray(part.times)[:, ::2]
-    last = np.asarray(part.last_step)
-    held, whole, least = intervals(part)
+    last, pieces = np.asarray(part.last_step), np.asarray(part.pieces)
     flow = part.kinematics
     cycle = np.asarray(part.cycle).astype(np.int64)
     ends = np.take_along_axis(times, np.maximum(cycle, 0), axis=1)
@@ -185,17 +113,15 @@ def _runs(part: TransientFlows) -> _Runs:
         np.minimum(last + 1, np.max(last)).astype(np.int64),
         cycle,
         np.where(cycle[:, 0] < 0, 1.0, np.diff(ends, axis=1)[:, 0]),
-        held,
-        np.diff(times),
-        whole,
-        least,
+        pieces,
+        np.diff(times) / pieces,
+        1.0 / pieces,
         JUMP * times[:, -1],
         flows_of(part.kinematics),
         _Signals.of(part),
         rate,
         tool_rate,
         flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
-        _lines(times, np.asarray(part.sample_index)),
     )
 
 
@@ -282,12 +208,6 @@ class SideBySide(LanePredictor):
             beside = [np.moveaxis(of, -1, 0) for of in own]
         if not (laid_out.in_shear and np.any(thetas[:, self._distorting])):
             return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
-        if np.any(laid_out.held > 1):
-            # what alters a signal looks beyond its samples, at all steps of the grid
-            given["held"] = np.ones_like(laid_out.held)
-            stress, felt, *_ = self._code(runs, declared, used, given)
-            before, share = (of[:runs] for of in laid_out.lines)
-            stress[:runs] += _between(at_samples - stress[places], before, share)
         beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
         felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
         signals = laid_out.signals.of_first(runs)
@@ -335,7 +255,7 @@ class SideBySide(LanePredictor):
         # those of chains that retract depend on more than the times
         if numbers.law.retracts or (count < _MANY and time != 0.0):
             return time, None
-        width = np.diff(np.asarray(part.times)[:, ::2], axis=1)
+        width = self._runs(part).width
         h = width[..., None] / (np.asarray(own) * np.exp(time))
         weights = krogstad_weights(-float(numbers.law.linear_relaxation) * h, h)
         found = np.stack(weights[:WEIGHTS], axis=-1)

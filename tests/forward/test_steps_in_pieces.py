@@ -1,6 +1,5 @@
-"""Vectors choose their own steps while the rate is constant; answers by scipy on full tensors."""
+"""Steps in pieces, which end early once steady; answers by scipy on full tensors."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import Giesekus, JohnsonSegalman, PhanThienTanner, Structured, steps
@@ -9,7 +8,6 @@ from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.side_by_side.kernel import Kernel
-from discover.laws import AbstractConstitutiveLaw
 from discover.protocols import after_steady_flow, start_up
 
 BEFORE, AFTER = 5.0, 0.5
@@ -46,7 +44,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize(
-    # the two that take most of what steps choose: a law that thins fast, and a jump of a hundred
+    # the two that err most: a law that thins fast, and a jump of a hundred
     ("law", "before"),
     [
         ("ptt_linear", BEFORE),
@@ -58,7 +56,7 @@ LAWS = {
         ),
     ],
 )
-def test_a_run_from_a_steady_flow_is_exact_in_a_third_of_the_steps(law, before, monkeypatch):
+def test_a_run_from_a_steady_flow_is_exact_without_the_idle_pieces(law, before, monkeypatch):
     parameters, independent = LAWS[law]
     one, held = run(before, AFTER)
     taken, batch = counted(monkeypatch), make_batch([one])
@@ -68,7 +66,10 @@ def test_a_run_from_a_steady_flow_is_exact_in_a_third_of_the_steps(law, before, 
     # what the grid's own steps after the jump leave, most where a law thins fast
     most = 3e-5 if law == "ptt_linear" else 5e-6
     np.testing.assert_allclose(found, exact, atol=most * np.max(np.abs(exact)))
-    assert 3 * taken[0] < int(batch.parts[0].last_step[0])
+    # at a rate of 5 steady after a sixth of the flow before; at 50, held for a tenth of the time,
+    # after two thirds
+    most_taken = 0.75 if before > BEFORE else 1.0 / 3.0
+    assert taken[0] < most_taken * int(np.sum(batch.parts[0].pieces))
 
 
 STRUCTURE = "thixotropic_relaxation_two_times"
@@ -109,11 +110,11 @@ def test_steps_of_a_vector_do_not_depend_on_those_beside_it():
     batch = make_batch([one])
     together = model.predictions(thetas, batch)
     alone = [model.predict(theta, batch) for theta in thetas]
-    np.testing.assert_allclose(together, alone, rtol=1e-11, atol=1e-13)
+    # all are followed until the last is steady, to 1e-9
+    np.testing.assert_allclose(together, alone, rtol=1e-9, atol=1e-13)
 
 
 def test_a_signal_altered_by_nothing_is_the_signal():
-    """What looks between samples takes the grid's steps, and is as exact at the samples."""
     one, _ = run(BEFORE, AFTER)
     names = "transducer_lag", "time_delay"
     model = AugmentedModel(
@@ -137,35 +138,3 @@ def test_a_vector_that_runs_away_before_the_record_is_told_so():
     assert not np.any(np.abs(found[0]) < 1e3)
     fading = AFTER + (BEFORE - AFTER) * np.exp(-TIMES)
     np.testing.assert_allclose(found[1, 0], fading, rtol=1e-9)
-
-
-def followed_by_chatter(monkeypatch):
-    """Return how many steps a law takes whose every step differs from its halves, however short."""
-
-    class Chatter(AbstractConstitutiveLaw):
-        linear_relaxation: bool = True
-
-        def extra_term(self, stress, rate):
-            del rate
-            x = jnp.tanh(stress)
-            for _ in range(30):  # cos(2³⁰ arccos x)
-                x = 2.0 * x * x - 1.0
-            return 1e12 * jnp.tanh(1e9 * stress) * (1.0 + 0.9 * x)
-
-    taken = counted(monkeypatch)
-    one = np.ones(2)
-    run = Run("start", np.array([3.0, 6.0]), start_up(1.0), one, one)
-    model = AugmentedModel(DeclaredModel(Chatter(), one[:1], one[:1]), [])
-    model.predict(model.zero(), make_batch([run]))
-    return sum(taken)
-
-
-@pytest.mark.slow
-def test_the_end_of_an_interval_is_reached_where_rounding_leaves_no_step_to_it(monkeypatch):
-    most = 20_000
-    monkeypatch.setattr("discover.forward.side_by_side.own_widths._ENOUGH", most)
-    monkeypatch.setattr("discover.forward.side_by_side.code.kept", lambda _, write: write()[0])
-    assert followed_by_chatter(monkeypatch) < most
-    # the control: without it the last tenth of what is left is tried for ever
-    monkeypatch.setattr("discover.forward.side_by_side.own_widths._ROUNDING", 0.0)
-    assert followed_by_chatter(monkeypatch) > 3 * most
