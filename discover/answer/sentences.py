@@ -319,9 +319,9 @@ def errors(answer: Any) -> list[Row]:
     found: list[Row] = []
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
-        told = [_error(one, value) for value in (one.inside, one.beyond)]
+        inside, beyond = _error(one, one.inside), _error(one, one.beyond)
         at = one.beyond_at if one.beyond is not None else ""
-        row = Row(symbol, note(answer, name), *told, at, one.is_known)
+        row = Row(symbol, note(answer, name), inside, beyond, at, one.is_known)
         if found and not row.is_known and found[-1] == row._replace(symbol=found[-1].symbol):
             row = row._replace(symbol=f"{found.pop().symbol}, {symbol}")
         found.append(row)

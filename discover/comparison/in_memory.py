@@ -197,7 +197,7 @@ def _training_runs(estimators: Mapping[str, RunPrediction], train: Any):
 
 
 def _common_base(estimators: Mapping[str, RunPrediction]) -> Fluid:
-    fluids = [known_part(one).fluid for one in estimators.values()]
+    fluids = [known_part(one) for one in estimators.values()]
     for other in fluids[1:]:
         if not _same_fluid(fluids[0], other):
             raise InputError(

@@ -25,6 +25,9 @@ class LawOfEachMode(AbstractExtendedLaw):
 
     law: AbstractConstitutiveLaw  # the law, with a leading axis of modes on every array
 
+    def __init__(self, law: AbstractConstitutiveLaw):
+        self.law = law
+
     @property
     def base(self) -> AbstractConstitutiveLaw:
         """The law, of which all is as of it."""

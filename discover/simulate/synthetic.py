@@ -136,8 +136,8 @@ def linear_sweep(fluid: Fluid) -> LinearSweep:
     omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
     _, *linear = at_rest(fluid.law, fluid.n_modes)
     modulus = 1j * omega * float(fluid.solvent_viscosity)
-    for size, time, *mode in zip(np.asarray(fluid.modulus), times, *linear, strict=True):
-        modulus += size * modulus_at_rest(*mode, time * omega)
+    for size, time, decay, drive in zip(np.asarray(fluid.modulus), times, *linear, strict=True):
+        modulus += size * modulus_at_rest(decay, drive, time * omega)
     return LinearSweep(omega, np.real(modulus), np.imag(modulus))
 
 

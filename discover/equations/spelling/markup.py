@@ -246,7 +246,7 @@ def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> 
 
     from tensor_library.sympy_notation import SympyNotation
 
-    total: sympy.Expr = sympy.Integer(0)
+    total: Any = sympy.Integer(0)
     notation = SympyNotation()
     if named is not None:
         letters = {name: sympy.Float(value) for name, value in named.constants[0].items()}

@@ -284,8 +284,10 @@ def probability_as_noise(fitter: Fitter, fit: Fit) -> float | None:
     rows = fitter.rows
     own = [rows.run == i for i in range(len(rows.runs))]
     left = (fitter.record(fit) - rows.recorded) / rows.size
-    one = np.ones(len(rows))
-    return noise_probability(*([each[at] for at in own] for each in (left, one, rows.recorded)))
+    left, seen, recorded = (
+        [each[at] for at in own] for each in (left, np.ones(len(rows)), rows.recorded)
+    )
+    return noise_probability(left, seen, recorded)
 
 
 def _unlike_noise(fitter: Fitter, fit: Fit) -> float:

@@ -239,7 +239,7 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[Run], known: Fluid, **limits: float) -> TrainingProblem:
+def _problem(runs: Sequence[Run], known: Fluid, **limits: Any) -> TrainingProblem:
     modes = np.asarray(known.modulus), np.asarray(known.relaxation_time)
     viscosity = float(known.solvent_viscosity)
     return make_problem(runs, *modes, solvent_viscosity=viscosity, base=known.law, **limits)

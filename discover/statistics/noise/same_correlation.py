@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from discover.statistics.noise.noise_model import Rows
 from discover.statistics.noise.smooth_misfit import exceeded, redrawn
 from discover.statistics.noise.whiteness import FEWEST_TESTED
 
@@ -13,9 +14,7 @@ _CORRELATIONS = np.linspace(0.0, 0.95, 39)
 _PLAIN = 0.05  # probability above which nothing needs to be drawn
 
 
-def same_correlation_probability(
-    rows: Sequence[Float[np.ndarray, " _"]], intervals: Sequence[float]
-) -> float:
+def same_correlation_probability(rows: Rows, intervals: Sequence[float]) -> float:
     """Return the probability of correlations that differ so much between runs, if all are one.
 
     Likelihood ratio of first-order noise with one correlation, from sample to sample or over time,
