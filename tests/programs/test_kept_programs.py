@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+from collections import Counter
 from functools import partial
 
 import equinox as eqx
@@ -12,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover import compilation_cache
 from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -297,3 +299,13 @@ def test_results_are_put_together_as_they_were():
     assert eqx.tree_equal(again, value)
     with pytest.raises(NotDescribable):
         take_apart(object(), [])
+
+
+def test_programs_to_compile_are_counted_among_those_that_were_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(compilation_cache, "_found", Counter())
+    assert compilation_cache.compiled_share() == 0.0
+    assert load_program(tmp_path / "one") is None
+    assert compilation_cache.compiled_share() == 1.0
+    save_program(tmp_path / "one", None, b"code")
+    assert load_program(tmp_path / "one") == (None, b"code")
+    assert compilation_cache.compiled_share() == 0.5
