@@ -22,21 +22,14 @@ A_TRANSIENT = (
 
 def headline(answer: Any) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
-    return " ".join(filter(None, [law(answer), quality(answer)]))
+    return " ".join(filter(None, first_lines(answer)))
 
 
-def law(answer: Any) -> str:
-    """Return the law by name with its constants; without one, what stands in its place."""
-    return _first_lines(answer)[0]
+def first_lines(answer: Any) -> tuple[str, str]:
+    """Return the law by name with constants, then how well it describes and where to use it.
 
-
-def quality(answer: Any) -> str:
-    """Return what follows the law: how well it describes, and where to use it."""
-    return _first_lines(answer)[1]
-
-
-def _first_lines(answer: Any) -> tuple[str, str]:
-    """Return both, as short as need be: what gives way is in the table."""
+    As short as need be: what gives way is in the table. Without a law, what stands in its place.
+    """
     told = "", ""
     for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2)):
         parts = description(answer, brief), answer.failed, where(answer)

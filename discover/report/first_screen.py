@@ -26,7 +26,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
     if answer is None:
         return None
-    headline, symbols = unbroken(sentences.law(answer)), [one.symbol for one in answer.constants]
+    headline, quality = map(unbroken, sentences.first_lines(answer))
+    symbols = [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
         # terms as the equation in Pa and s has them: over the stress of a mode in units of G
         for i, one in enumerate(answer.constants):
@@ -44,7 +45,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "answer": answer,
         "title": (answer.title or answer.instead.lower()).partition(":")[0],
         "headline": headline,
-        "quality": unbroken(sentences.quality(answer)),
+        "quality": quality,
         "errors": sentences.error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
         "law": _typeset(answer),
@@ -55,7 +56,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         ],
         "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
         "suspected": sentences.SUSPECTED.lower() + clock,
-        "expected": list(map(_expected, sentences.errors(answer))) if answer.title else (),
+        "expected": sentences.errors(answer) if answer.title else (),
         "copies": (copies := _copies(answer) if answer.title else []),
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "missing": _not_there(copies),
@@ -69,14 +70,6 @@ def _said(one: Constant) -> str:
     skewed = "at an end of its interval" if one.is_skewed or one.bound else ""
     at_end = "at its physical limit" if one.at_limit else skewed
     return "; ".join(filter(None, [one.said, at_end]))
-
-
-def _expected(row: sentences.Row) -> sentences.Row:
-    """Return a row of expected errors as its cells show it."""
-    return sentences.Row(
-        row.symbol, unbroken(row.note), in_cell(row.inside), in_cell(row.beyond),
-        unbroken(row.beyond_at), row.is_known,
-    )  # fmt: skip
 
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
