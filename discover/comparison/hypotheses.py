@@ -199,7 +199,10 @@ def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) ->
     fails, or the caller is interrupted, the others end where they next ask or say something.
     """
     if len(parts) < 2:
-        return {name: part(_named(name, progress)) for name, part in parts.items()}
+        return {
+            name: part(lambda text, fraction, name=name: progress(f"{name}: {text}", fraction))
+            for name, part in parts.items()
+        }
     told: queue.SimpleQueue[tuple[str, str, float] | Future[R]] = queue.SimpleQueue()
     stop, fractions = Event(), dict.fromkeys(parts, 0.0)
 
@@ -234,7 +237,3 @@ def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) ->
             stop.set()
             raise
     return {name: future.result() for name, future in futures.items()}
-
-
-def _named(name: str, progress: Progress) -> Progress:
-    return lambda text, fraction: progress(f"{name}: {text}", fraction)

@@ -197,17 +197,13 @@ def _training_runs(estimators: Mapping[str, RunPrediction], train: Any):
 
 
 def _common_base(estimators: Mapping[str, RunPrediction]) -> Fluid:
+    import equinox as eqx
+
     fluids = [known_part(one) for one in estimators.values()]
     for other in fluids[1:]:
-        if not _same_fluid(fluids[0], other):
+        if not eqx.tree_equal(fluids[0], other, rtol=1e-12):
             raise InputError(
                 f"The estimators have different known parts ({fluids[0]!r} and {other!r}), so "
                 "their terms cannot be compared. Give both the same base."
             )
     return fluids[0]
-
-
-def _same_fluid(one: Fluid, other: Fluid) -> bool:
-    import equinox as eqx
-
-    return bool(eqx.tree_equal(one, other, rtol=1e-12))

@@ -43,7 +43,7 @@ from discover.study.declared_model import StudyModel, declared_model, forward_mo
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import counted
-from tensor_library import LawTerm, TermLibrary
+from tensor_library import TermLibrary
 
 
 def data_in_words(data: StudyData, study: Study) -> str:
@@ -132,6 +132,9 @@ def compare(
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
     found = found.with_curves()
     outcomes = {name: replace(one, terms=proposed[name].terms) for name, one in outcomes.items()}
+    made_of, truth = study.data.synthetic, None
+    if made_of is not None and declared.law_name == "ucm":
+        truth = true_terms(made_of.law, made_of.parameters, study.model.known_relaxation)
     left = lacks_of_fit(
         outcomes, frame.flows, expectation_of(study, declared, data), options.use_normal_stresses
     )
@@ -153,8 +156,8 @@ def compare(
         posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
         lack_of_fit=left,
-        truth=_truth(study, declared),
-        noise=None if study.data.synthetic is None else study.data.synthetic.noise,
+        truth=truth,
+        noise=None if made_of is None else made_of.noise,
         seed=learning.seed,
         known=known_equation(frame.model),
         known_effects=frame.effects,
@@ -232,10 +235,3 @@ def _with_what_is_open(
         comparison, bands=bands, classical=fit_classical_laws(found, frame, study.compare.laws),
         rivals=(*twins, *others), statements=statements, structure=structure,
     )  # fmt: skip
-
-
-def _truth(study: Study, model: StudyModel) -> tuple[LawTerm, ...] | None:
-    synthetic = study.data.synthetic
-    if synthetic is None or model.law_name != "ucm":
-        return None
-    return true_terms(synthetic.law, synthetic.parameters, study.model.known_relaxation)

@@ -222,12 +222,11 @@ def _extension(fluid: Fluid) -> _Found:
 
 
 def _small_strain(fluid: Fluid) -> _Found:
-    drift, *linear = at_rest(fluid.law, fluid.n_modes)
+    drift, decays, drives = at_rest(fluid.law, fluid.n_modes)
     frequency = np.geomspace(0.01, 100.0, 41)
     maxwell = 1j * frequency / (1.0 + 1j * frequency)
-    moduli = np.array(
-        [modulus_at_rest(decay, drive, frequency) for decay, drive in zip(*linear, strict=True)]
-    )
+    modes = zip(decays, drives, strict=True)
+    moduli = np.array([modulus_at_rest(decay, drive, frequency) for decay, drive in modes])
     value = float(np.max(np.abs(moduli - maxwell) / np.abs(maxwell)))
     offset = float(np.max(np.abs(drift)))
     text = (

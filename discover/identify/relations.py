@@ -81,7 +81,7 @@ def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     for touches, components in _COMPONENTS_SEEN.items():
         rows = [[value[i] for value in at_state] for at_state in values for i in components]
         for vector in _null_space(rows):
-            if not _is_new(vector, known):
+            if len(_reduced([*known, vector])[1]) == len(known):  # it is one of these
                 continue
             known.append(vector)
             found.append(
@@ -156,10 +156,6 @@ def _rational(residue: int) -> Fraction | None:
     if new_t == 0 or abs(new_t) > limit:
         return None
     return Fraction(new, new_t)
-
-
-def _is_new(vector: Sequence[int], known: Sequence[Sequence[int]]) -> bool:
-    return len(_reduced([*known, vector])[1]) > len(known)
 
 
 def feels_33(library: TermLibrary) -> bool:

@@ -134,9 +134,10 @@ def linear_sweep(fluid: Fluid) -> LinearSweep:
     """
     times = np.asarray(fluid.relaxation_time)
     omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
-    _, *linear = at_rest(fluid.law, fluid.n_modes)
+    _, decays, drives = at_rest(fluid.law, fluid.n_modes)
     modulus = 1j * omega * float(fluid.solvent_viscosity)
-    for size, time, decay, drive in zip(np.asarray(fluid.modulus), times, *linear, strict=True):
+    modes = zip(np.asarray(fluid.modulus), times, decays, drives, strict=True)
+    for size, time, decay, drive in modes:
         modulus += size * modulus_at_rest(decay, drive, time * omega)
     return LinearSweep(omega, np.real(modulus), np.imag(modulus))
 

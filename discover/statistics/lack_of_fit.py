@@ -158,7 +158,9 @@ _PATTERNED = {
 """What may have a pattern, by whether the noise is given and whether runs were repeated."""
 
 
-def _without_outliers(residuals: Rows, measured: Rows) -> tuple[Rows, Rows, int]:
+def _without_outliers(
+    residuals: Rows, measured: Rows
+) -> tuple[list[np.ndarray], list[np.ndarray], int]:
     """Return residuals over the size of each record, the records, and the number of outliers."""
     rows, records, outliers = [], [], 0
     sizes = [rms(record) or 1.0 for record in measured]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.fft import dct
 from scipy.signal import lfilter
 from scipy.stats import gamma
@@ -79,21 +79,8 @@ def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):
 @lru_cache(maxsize=16)
 def _spectra(n: int):
     """Return one over every spectrum that is tried, shape (n, tried), and half its log, summed."""
-    k = np.arange(n)
-    noise = _correlated(_CORRELATIONS, np.pi * k / n)
-    both = noise[:, None, None] + _SHARES[:, None] * _smooth(k)[:, None, :]
-    spectra = both.reshape(-1, n)
+    k, rho = np.arange(n), _CORRELATIONS[:, None]
+    noise = (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(np.pi * k / n) + rho**2)
+    smooth = 1.0 / (1.0 + (k / _HALF_SWINGS[:, None]) ** 4)
+    spectra = (noise[:, None, None] + _SHARES[:, None] * smooth[:, None, :]).reshape(-1, n)
     return (1.0 / spectra).T, 0.5 * np.sum(np.log(spectra), axis=1)
-
-
-def _smooth(k: Int[np.ndarray, " m"]) -> Float[np.ndarray, "swings m"]:
-    """Return the spectra of smooth misfits at so many half swings."""
-    return 1.0 / (1.0 + (k / _HALF_SWINGS[:, None]) ** 4)
-
-
-def _correlated(
-    rho: Float[np.ndarray, " q"], angle: Float[np.ndarray, " m"]
-) -> Float[np.ndarray, "q m"]:
-    """Return the spectra of noise with first-order correlations, angles of π being the fastest."""
-    rho = rho[:, None]
-    return (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)
