@@ -2,21 +2,15 @@
 
 from tensor_library.algebra import (
     INVARIANT_NAMES,
-    SHEAR_COMPONENTS,
     TENSOR_NAMES,
     anticommutator,
-    from_shear,
     identity_like,
     inner,
     integrity_basis,
-    planar_extension,
     rate_of_deformation,
     scalar_invariants,
-    simple_shear,
     square,
-    to_shear,
     trace,
-    uniaxial_extension,
     upper_convected_production,
 )
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm, register_closed_form
@@ -25,9 +19,8 @@ from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import CandidateTerm, parse_term
 
 __all__ = [
-    "CLOSED_FORMS", "INVARIANT_NAMES", "SHEAR_COMPONENTS", "TENSOR_NAMES", "CandidateTerm",
-    "ClosedForm", "LawTerm", "LawTerms", "TermLibrary", "anticommutator", "build_library",
-    "from_shear", "identity_like", "inner", "integrity_basis", "parse_term", "planar_extension",
-    "rate_of_deformation", "register_closed_form", "scalar_invariants", "simple_shear", "square",
-    "to_shear", "trace", "uniaxial_extension", "upper_convected_production",
+    "CLOSED_FORMS", "INVARIANT_NAMES", "TENSOR_NAMES", "CandidateTerm", "ClosedForm", "LawTerm",
+    "LawTerms", "TermLibrary", "anticommutator", "build_library", "identity_like", "inner",
+    "integrity_basis", "parse_term", "rate_of_deformation", "register_closed_form",
+    "scalar_invariants", "square", "trace", "upper_convected_production",
 ]  # fmt: skip

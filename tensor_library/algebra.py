@@ -10,10 +10,6 @@ Examples
 ([1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 6.0])
 >>> float(trace(square(first))), float(inner(second, second))
 (4.0, 18.0)
->>> to_shear(from_shear(second)).tolist(), simple_shear(jnp.asarray(2.0))[0].tolist()
-([0.0, 0.0, 0.0, 3.0], [0.0, 2.0, 0.0])
->>> [jnp.diag(flow(jnp.asarray(2.0))).tolist() for flow in (uniaxial_extension, planar_extension)]
-[[2.0, -1.0, -1.0], [2.0, -2.0, 0.0]]
 >>> rate_of_deformation(jnp.asarray(2.0)).tolist()  # of simple shear
 [0.0, 0.0, 0.0, 2.0]
 """
@@ -78,18 +74,6 @@ def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
     return jnp.sum(first * second)
 
 
-def to_shear(tensor: Float[Array, "3 3"]) -> Float[Array, "4"]:
-    """Return the four components (11, 22, 33, 12) of a tensor in simple shear."""
-    return jnp.stack([tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1]])
-
-
-def from_shear(components: Float[Array, "4"]) -> Float[Array, "3 3"]:
-    """Return the full tensor of four simple-shear components (11, 22, 33, 12)."""
-    a11, a22, a33, a12 = components
-    zero = jnp.zeros_like(a11)
-    return jnp.stack([a11, a12, zero, a12, a22, zero, zero, zero, a33]).reshape(3, 3)
-
-
 def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float[Array, "..."]:
     """Return Σᵢ first[…, i] second[i, …], as `jnp.tensordot` with `axes=1` does.
 
@@ -97,10 +81,6 @@ def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float
     """
     columns = (1,) * (second.ndim - 1)
     return jnp.sum(first.reshape(first.shape + columns) * second, axis=first.ndim - 1)
-
-
-SHEAR_COMPONENTS = ("11", "22", "33", "12")
-"""Order of the four components that live in simple shear."""
 
 
 INVARIANT_NAMES = (
@@ -169,21 +149,6 @@ def integrity_basis(
 
 VelocityGradient = Float[Array, "3 3"] | Float[Array, "4"] | Float[Array, ""]
 """L in 1/s: full; (L11, L22, L33, L12) where the third axis is principal; or a shear rate."""
-
-
-def simple_shear(shear_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
-    """Return the velocity gradient of v₁ = γ̇ x₂."""
-    return jnp.zeros((3, 3), dtype=jnp.result_type(shear_rate, float)).at[0, 1].set(shear_rate)
-
-
-def uniaxial_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
-    """Return the velocity gradient of uniaxial extension along x₁ at constant volume."""
-    return extension_rate * jnp.diag(jnp.array([1.0, -0.5, -0.5]))
-
-
-def planar_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
-    """Return the velocity gradient of planar extension in the x₁ x₂ plane."""
-    return extension_rate * jnp.diag(jnp.array([1.0, -1.0, 0.0]))
 
 
 def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:

@@ -236,16 +236,12 @@ class AugmentedLaw(AbstractExtendedLaw):
         if name not in effects or self.base.as_terms() != ():
             return None
         at = effects.index(name)
-        value = self.values[at][0]
-        alone = effect_terms(self.effects[at], np.asarray(self.values[at]))
-        for law in LAWS.values():
-            if len(law.parameters) != 1 or len(self.values[at]) != 1:
-                continue
-            built = law.build(value)
-            if (built.as_terms() or ()) and law_terms(built) == alone:
-                values, effects = (of[:at] + of[at + 1 :] for of in (self.values, self.effects))
-                whole = replace(self, base=built, values=values, effects=effects)
-                return whole, next(iter(law.parameters))
+        alone = replace(self, values=(self.values[at],), effects=(self.effects[at],))
+        for law, constants in _names_of(alone).items():
+            ((constant, value),) = constants.items()
+            values, effects = (of[:at] + of[at + 1 :] for of in (self.values, self.effects))
+            base = LAWS[law].build(value)
+            return replace(self, base=base, values=values, effects=effects), constant
         return None
 
     def _added_terms(self) -> tuple[LawTerm, ...]:
