@@ -13,6 +13,7 @@ from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quant
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.left_out import FEWEST_RUNS, by_first_order, by_left_out, left_out
+from discover.inference.engine.noise import LEAST
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
@@ -29,6 +30,9 @@ WINDOW = 12.0
 UNLIKE_NOISE = 0.02
 """Prior probability of what neither a candidate nor a smooth curve follows: of a residual with a
 probability of one in a thousand as noise it makes even odds."""
+
+_SEEN = 3.0
+"""Of the noise that is always there, what a run leaves to be asked whether it is noise."""
 
 _MOST = 8
 _WITH_DISCREPANCY = 2
@@ -280,13 +284,16 @@ def _left_by(search: Search, fit: Fit, known: Sequence[Discrepancy]) -> Discrepa
 
 
 def probability_as_noise(fitter: Fitter, fit: Fit) -> float | None:
-    """Return the probability of what a fit leaves, if it is noise; None of too few samples."""
+    """Return the probability of what a fit leaves, if it is noise; None of too few samples.
+
+    Of runs that leave no more than the noise that is always there nothing is asked.
+    """
     rows = fitter.rows
-    own = [rows.run == i for i in range(len(rows.runs))]
     left = (fitter.record(fit) - rows.recorded) / rows.size
-    left, seen, recorded = (
-        [each[at] for at in own] for each in (left, np.ones(len(rows)), rows.recorded)
-    )
+    large = np.flatnonzero(rows.rms_by_run(left) > _SEEN * LEAST)
+    own = [rows.run == i for i in large]
+    every = left, np.ones(len(rows)), rows.recorded
+    left, seen, recorded = ([each[at] for at in own] for each in every)
     return noise_probability(left, seen, recorded)
 
 
