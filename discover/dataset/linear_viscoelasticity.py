@@ -223,5 +223,5 @@ def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
     if rows.shape[1] < FEWEST_FAST:
         return False
     chance = len(rows) * min(separate_probability([row]) for row in rows)
-    of_all = noise_probability(rows, np.ones_like(rows))
+    of_all = noise_probability(rows)
     return min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE

@@ -112,7 +112,7 @@ def lack_of_fit(
     if telling:
         rows, records = ([some[i] for i in telling] for some in (rows, records))
     misfit = float(np.mean(list(map(rms, rows))))
-    probability = noise_probability(rows, list(map(np.ones_like, rows)), records, further)
+    probability = noise_probability(rows, records, further)
     floor = noise_floor(rows, probability) if expectation.noise is None else expectation.noise
     expected = float(np.hypot(max(floor, expectation.repeat_error), expectation.linear_error))
     known = expectation.noise is not None or bool(telling)

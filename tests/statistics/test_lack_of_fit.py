@@ -45,10 +45,10 @@ def test_spikes_once_a_cycle_are_found_by_the_cycle():
     turn = np.arange(SAMPLES) * 2.0 * np.pi / 33.0
     record = 10.0 * np.sin(turn)
     assert whiteness.cycle(record) == pytest.approx(33.0, abs=0.5)
-    here, weight = generator.standard_normal(SAMPLES), np.ones((1, SAMPLES))
-    assert whiteness.noise_probability((here + once)[None], weight) > 1e-3
-    assert whiteness.noise_probability((here + once)[None], weight, record[None]) < 1e-3
-    assert whiteness.noise_probability(here[None], weight, record[None]) > 1e-3
+    here = generator.standard_normal(SAMPLES)
+    assert whiteness.noise_probability((here + once)[None]) > 1e-3
+    assert whiteness.noise_probability((here + once)[None], record[None]) < 1e-3
+    assert whiteness.noise_probability(here[None], record[None]) > 1e-3
 
 
 PROPORTIONAL = np.abs(np.sin(TIMES)) + 0.1
@@ -66,11 +66,10 @@ LOUDER_LATER = 1.0 + 4.0 * (TIMES > 30.0)
     ],
 )
 def test_noise_of_any_size_is_rarely_taken_for_structure(correlation, size):
-    weight = np.ones((3, SAMPLES))
     taken = 0
     for seed in range(30):
         rows = np.array([size * correlated(correlation, 100 * seed + i) for i in range(3)])
-        taken += whiteness.noise_probability(rows, weight, np.tile(WAVE, (3, 1))) <= 1e-3
+        taken += whiteness.noise_probability(rows, np.tile(WAVE, (3, 1))) <= 1e-3
     # significance 0.001: more than 2 of 30 has a probability below 1e-5
     assert taken <= 2
 
@@ -113,7 +112,7 @@ def test_separate_points_of_noise_alone_agree_as_seldom_as_the_level_says():
 def test_a_smooth_misfit_of_separate_points_is_no_noise_though_few_are_tested_otherwise():
     smooth = np.cos(np.linspace(0.0, 2.0 * np.pi, 20))
     left = 3.0 * smooth + np.random.default_rng(0).standard_normal(20)
-    assert whiteness.noise_probability(left[None], np.ones((1, 20))) is None
+    assert whiteness.noise_probability(left[None]) is None
     assert whiteness.separate_probability([left]) < 0.01
 
 

@@ -15,7 +15,7 @@ PHASE = np.linspace(0.0, 6.0, SAMPLES)
 
 
 def probability_of(rows):
-    return noise_probability(rows, [np.ones_like(row) for row in rows])
+    return noise_probability(rows)
 
 
 def is_noise(rows):

@@ -70,7 +70,7 @@ def test_few_samples_do_not_hide_a_misfit_in_the_noise():
     for seed in range(20):
         noise = NOISE * np.random.default_rng(seed).standard_normal((4, 8))
         rows = missed + noise
-        probability = noise_probability(rows, np.ones_like(rows))
+        probability = noise_probability(rows)
         floors.append(noise_floor([*rows], probability))
         assert not Expectation().explains([*rows], probability, floors[-1])
     # 16 differences tell it to 40 %, the mean of 20 draws to 9 %; the bends of the misfit add some

@@ -292,9 +292,7 @@ def probability_as_noise(fitter: Fitter, fit: Fit) -> float | None:
     left = (fitter.record(fit) - rows.recorded) / rows.size
     large = np.flatnonzero(rows.rms_by_run(left) > _SEEN * LEAST)
     own = [rows.run == i for i in large]
-    every = left, np.ones(len(rows)), rows.recorded
-    left, seen, recorded = ([each[at] for at in own] for each in every)
-    return noise_probability(left, seen, recorded)
+    return noise_probability([left[at] for at in own], [rows.recorded[at] for at in own])
 
 
 def _unlike_noise(fitter: Fitter, fit: Fit) -> float:

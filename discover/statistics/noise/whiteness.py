@@ -86,10 +86,7 @@ _FEWEST_CYCLES = 2
 
 
 def noise_probability(
-    residual: Rows,
-    weight: Rows,
-    measured: Rows | None = None,
-    further: Sequence[float] = (),
+    residual: Rows, measured: Rows | None = None, further: Sequence[float] = ()
 ) -> float | None:
     """Return the probability of residuals as structured as these, if they are noise.
 
@@ -111,16 +108,15 @@ def noise_probability(
     correlation of the longer runs, or none. The smallest probability counts as often as there are
     tests; None if all runs together are too short.
 
-    `residual`: of each run, in any unit, padded or not. `weight`: positive where there is a sample.
-    `measured`: the records, by which cycles are found. `further`: probabilities by other tests of
-    the longer runs.
+    `residual`: of each run, in any unit. `measured`: the records, by which cycles are found.
+    `further`: probabilities by other tests of the longer runs.
     """
     rows, records, short = [], [], []
-    for i, (values, seen) in enumerate(zip(residual, weight, strict=True)):
-        row = np.asarray(values)[np.asarray(seen) > 0]
+    for i, values in enumerate(residual):
+        row = np.asarray(values)
         if len(row) >= FEWEST_TESTED and np.any(row):
             rows.append(row / _spread(row))
-            records.append(None if measured is None else np.asarray(measured[i])[seen > 0])
+            records.append(None if measured is None else np.asarray(measured[i]))
         elif len(row) >= FEWEST_FAST and np.any(row):
             short.append(row)
     if sum(map(len, short)) < FEWEST_TESTED:
@@ -140,10 +136,7 @@ def noise_probability(
     ]
     if len(rows) > 1:
         tests.append(_alike(padded, count))
-        seen = [np.asarray(w) > 0 for w in weight]
-        tests.append(
-            same_place_probability([r[s] for r, s in zip(residual, seen, strict=True) if any(r[s])])
-        )
+        tests.append(same_place_probability([row for row in residual if np.any(row)]))
     cycles = [cycle(record) if record is not None else None for record in records]
     if any(length is not None for length in cycles):
         tests.append(_repeats(white, count, cycles))
