@@ -69,7 +69,7 @@ class FiniteExtensibility(ConstitutiveEffect):
     """
 
     def extra_term(self, values, stress, rate):
-        return fene_p(values[0], stress, rate)
+        return fene_p(values[0], 1.0 - 3.0 * values[0], stress, rate)
 
     def as_terms(self, values):
         return fene_p_terms(values[0])

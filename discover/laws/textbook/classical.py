@@ -112,17 +112,23 @@ class FenePeterlin(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        return fene_p(1.0 / self.maximum_extension_squared, stress, rate)
+        limit = self.maximum_extension_squared
+        return fene_p(1.0 / limit, (limit - 3.0) / limit, stress, rate)
 
     def as_terms(self) -> tuple[LawTerm, ...]:
         return fene_p_terms(1.0 / float(self.maximum_extension_squared))
 
 
-def fene_p(inverse: Float[Array, ""], stress: Symmetric, rate: Symmetric) -> Symmetric:
-    """Return h of FENE-P with q = 1/L²: q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q)."""
+def fene_p(
+    inverse: Float[Array, ""], rest: Float[Array, ""], stress: Symmetric, rate: Symmetric
+) -> Symmetric:
+    """Return h of FENE-P: q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q).
+
+    `inverse`: q = 1/L². `rest`: 1 − 3q, by itself, for it may be small.
+    """
     stretch = trace(stress)
     factor = 1.0 + inverse * stretch
-    growth = inverse * (inner(stress, rate) - factor * stretch) / (1.0 - 3.0 * inverse)
+    growth = inverse * (inner(stress, rate) - factor * stretch) / rest
     return inverse * stretch * stress - growth * (stress + identity_like(stress))
 
 
