@@ -33,6 +33,9 @@ FORMAT, VERSION = "discover estimator", 3
 _LARGEST = 2**28
 """Bytes of a file, and of what it unpacks to, at most: an estimator of megabytes is a large one."""
 
+_ZIP = b"PK"
+"""Begins what forms before the third were."""
+
 _DAMAGES = (LookupError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
 
 _KIND = "kind"
@@ -85,6 +88,8 @@ class EstimatorFile:
                 content = parse_json(_unpacked(packed))
             except (ValueError, zlib.error) as error:
                 raise self.damaged(error) from None
+        elif packed.startswith(_ZIP) and b"estimator.json" in packed:
+            content = {"format": FORMAT, "version": "1 or 2", "made_by": "an earlier version"}
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise InputError(
                 f"{self._path} is not a complete estimator file. Give a file that "

@@ -6,6 +6,7 @@ import json
 import pickle
 import subprocess
 import sys
+import zipfile
 
 import jax
 import numpy as np
@@ -182,6 +183,10 @@ def test_files_of_other_kinds_are_refused(sindy, tmp_path):
         (tmp_path / "other").write_bytes(content)
         with pytest.raises(dc.InputError, match=r"not a complete estimator|is damaged"):
             dc.load(tmp_path / "other")
+    with zipfile.ZipFile(tmp_path / "before", "w") as file:
+        file.writestr("estimator.json", "{}")
+    with pytest.raises(dc.InputError, match=r"an earlier version in the form 1 or 2.*fit again"):
+        dc.load(tmp_path / "before")
 
 
 def test_what_a_file_cannot_hold_is_said_and_the_old_file_stays(sindy, tmp_path):
