@@ -16,7 +16,7 @@ from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
-from discover.inference.engine.posterior import probability_as_noise
+from discover.inference.engine.posterior import left_by_run
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
 from discover.loop import final_model
@@ -34,7 +34,7 @@ from discover.loop.parts import (
 )
 from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
-from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE
+from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
 from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of
 
@@ -223,7 +223,7 @@ class Ended(Path):
         """Return what is left, as the contract names it."""
         problem, fit = self.posterior.problem, self.fit
         rows = problem.fitted
-        probability = probability_as_noise(self.posterior.search.fitter, fit)
+        probability = noise_probability(*left_by_run(self.posterior.search.fitter, fit))
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs

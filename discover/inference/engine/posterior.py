@@ -18,7 +18,8 @@ from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
 from discover.linear_algebra_threads import in_one_thread
-from discover.statistics.noise.whiteness import noise_probability
+from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
+from discover.statistics.noise.whiteness import FEWEST_TESTED
 
 NONE = 0.3
 """Prior probability that something has no name; on development seeds of judged worlds anything from
@@ -28,11 +29,11 @@ WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
 
 UNLIKE_NOISE = 0.02
-"""Prior probability of what neither a candidate nor a smooth curve follows: of a residual with a
-probability of one in a thousand as noise it makes even odds."""
+"""Prior probability of a smooth misfit of another kind than the curves: of one that noise has once
+in a thousand times it makes even odds."""
 
 _SEEN = 3.0
-"""Of the noise that is always there, what a run leaves to be asked whether it is noise."""
+"""Of the noise that is always there, what a run leaves to be tested for noise."""
 
 _MOST = 8
 _WITH_DISCREPANCY = 2
@@ -283,26 +284,27 @@ def _left_by(search: Search, fit: Fit, known: Sequence[Discrepancy]) -> Discrepa
     return next(same, None) or Discrepancy(search.fitter, fit, least)
 
 
-def probability_as_noise(fitter: Fitter, fit: Fit) -> float | None:
-    """Return the probability of what a fit leaves, if it is noise; None of too few samples.
+def left_by_run(fitter: Fitter, fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return what a fit leaves of each run, over its size, and the record in Pa.
 
-    Of runs that leave no more than the noise that is always there nothing is asked.
+    Not of runs that leave no more than the noise that is always there.
     """
     rows = fitter.rows
     left = (fitter.record(fit) - rows.recorded) / rows.size
-    large = np.flatnonzero(rows.rms_by_run(left) > _SEEN * LEAST)
-    own = [rows.run == i for i in large]
-    return noise_probability([left[at] for at in own], [rows.recorded[at] for at in own])
+    own = [rows.run == i for i in np.flatnonzero(rows.rms_by_run(left) > _SEEN * LEAST)]
+    return [left[at] for at in own], [rows.recorded[at] for at in own]
 
 
 def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
-    """Return the log odds of what no curve follows either: of what a fit leaves, were it noise.
+    """Return the log odds of a smooth misfit that no curve follows, and noise would be slow.
 
-    A probability p of it as noise speaks against noise by a factor of −1/(e p ln p) at most
-    [Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62].
+    Of all tests of noise only this one speaks of the fluid: noise that was rounded, smoothed or
+    hums is no first-order noise either. A probability p as noise speaks against it by a factor of
+    −1/(e p ln p) at most   [Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62].
     """
-    p = probability_as_noise(fitter, fit)
-    if p is None or p >= np.exp(-1.0):
+    rows = [row for row in left_by_run(fitter, fit)[0] if len(row) >= FEWEST_TESTED]
+    p = smooth_misfit_probability(rows) if rows else 1.0
+    if p >= np.exp(-1.0):
         return -np.inf
     p = max(p, 1e-300)
     return float(np.log(-1.0 / (np.e * p * np.log(p)) - 1.0) + np.log(UNLIKE_NOISE))
