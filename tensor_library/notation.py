@@ -1,4 +1,4 @@
-"""What a notation has to say, so that terms can be written in it: LaTeX, MathML, Python, SymPy.
+"""What a notation has to say, so that terms can be written in it: LaTeX, Python, SymPy.
 
 `CandidateTerm.spell` decides once what a term is made of, in which order, and where a sum needs
 brackets. A notation only says how it writes a tensor, a product or a bracket.
@@ -93,16 +93,12 @@ class Notation:
 
 
 def printed(
-    expression: Any,
-    letters: Mapping[str, str],
-    printer: Callable[[Any], str],
-    placeholder: str = "{}",
+    expression: Any, letters: Mapping[str, str], printer: Callable[[Any], str]
 ) -> tuple[str, bool]:
     """Return an expression as a printer of SymPy writes it, with given texts for its symbols.
 
     `expression`: over symbols. `letters`: what stands for them, by their names. `printer`: takes an
-    expression and returns text. `placeholder`: how the printer writes a symbol, with ``{}`` for its
-    name. Returns the text, and whether it needs brackets to be a factor.
+    expression and returns text. Returns the text, and whether it needs brackets to be a factor.
     """
     import sympy
 
@@ -111,7 +107,7 @@ def printed(
     stand_ins = [sympy.Symbol(f"scalar{chr(97 + i)}of", real=True) for i in range(len(symbols))]
     text = printer(expression.xreplace(dict(zip(symbols, stand_ins, strict=True))))
     for symbol, stand_in in zip(symbols, stand_ins, strict=True):
-        text = text.replace(placeholder.format(stand_in.name), letters[symbol.name])
+        text = text.replace(stand_in.name, letters[symbol.name])
     return text, expression.is_Add or expression.could_extract_minus_sign()
 
 
@@ -171,4 +167,5 @@ class LatexNotation(Notation):
             n: self.brackets.format(one) if times in one else one for n, one in letters.items()
         }
         text, is_sum = printed(expression, known, printer)
+        text = re.sub(r"\\left\((\\[a-zA-Z]+|[^\W\d])\\right\)(?=\^)", r"\1", text)
         return self.brackets.format(text) if factor and is_sum else text

@@ -36,7 +36,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    for name in ("material", "mkdocstrings", "nbconvert", "latex2mathml"):
+    for name in ("material", "mkdocstrings", "nbconvert"):
         pytest.importorskip(name)
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "-q", "-d", str(folder)]

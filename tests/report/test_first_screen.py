@@ -310,7 +310,7 @@ def test_rates_in_prose_and_tables_cannot_be_read_as_numbers():
 def test_a_law_of_one_mode_is_written_in_units_whatever_its_values():
     law = Equation((LawTerm("sigma.sigma", 0.2),))
     written = answer_screen(replace(MELT, equation=law, modes=(Mode(1.0, 1.0),)))["law"]
-    assert "<mi>λ</mi>" in written
+    assert r'alttext="\lambda ' in written
     assert "<mi>G</mi>" in written
 
 
@@ -383,6 +383,6 @@ def test_equations_that_the_answer_rests_on_are_larger_than_text():
 def test_a_constant_of_each_mode_has_its_index():
     each = tuple({"epsilon": value} for value in (0.2, 0.5))
     law = law_element((), True, NamedPart("ptt_linear", each), modes=2)
-    assert "<msub><mi>ε</mi><mi>k</mi></msub>" in law
+    assert "ε_{k}" in law
     one = law_element((), True, NamedPart("ptt_linear", each[:1]), modes=2)
-    assert "<msub><mi>ε</mi>" not in one
+    assert "ε_" not in one

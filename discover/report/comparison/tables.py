@@ -11,7 +11,7 @@ from discover import words
 from discover.comparison import Comparison, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
-from discover.equations.spelling.markup import law_element, term_element, term_mathml
+from discover.equations.spelling.markup import law_element, sum_elements, term_element
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
@@ -235,24 +235,11 @@ def _titles(comparison: Comparison) -> dict[str, str]:
 _LAW_SPELLED = re.compile(r"^h = .*? (?=(?:leaves|gives|predicts) )")
 
 
-def _sign(value: float, first: bool) -> str:
-    if first and value >= 0:
-        return ""
-    form = "prefix" if first else "infix"  # between spaces
-    return f'<mo form="{form}">{"−" if value < 0 else "+"}</mo>'
-
-
 def rival_row(rival: Rival, comparison: Comparison) -> dict[str, Any]:
     """Return a law that the data do not tell from the one found."""
-    # one element a term, so that a long law breaks between them
-    terms = [
-        f"<math><mrow>{_sign(value, first=not i)}{term_mathml(name, rival.law.inner, abs(value))}"
-        "</mrow></math>"
-        for i, (name, value) in enumerate(rival.law.coefficients.items())
-    ]
     place, titles = rival.separated_by, _titles(comparison)
     return {
-        "math": " ".join(terms),
+        "math": sum_elements(rival.law.terms),
         # it stands above the sentence
         "reason": _LAW_SPELLED.sub("It ", rival.reason),
         "errors": rival.errors_to_chosen,
