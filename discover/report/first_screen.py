@@ -34,10 +34,10 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             if one.is_term:
                 symbols[i] = one.symbol.replace("σ", "τ")
                 headline = headline.replace(one.symbol, symbols[i])
-    ends = answer.range.rate_1_s or ()
+    ends = answer.range.rate_1_s
     shifted = [
         ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)}"
-         + unbroken(f"; range {modes.span([end / one for end in ends])} 1/s" if ends else ""),
+         + unbroken(f"; range {modes.span((ends[0] / one, ends[1] / one))} 1/s" if ends else ""),
          words.significant(one, 3), "") for at, one in modes.shifts(answer)
     ]  # fmt: skip
     timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
