@@ -2,7 +2,7 @@
 
 Fluids and flows are of scipy simulators that share nothing with a contestant. A contestant is told
 five records, the linear fluid (G = 1 Pa, λ = 1 s) and a seed, and returns a law; judged is how far
-it is off in flows that none of them saw. What others, classical fits and an upper convected
+it is off in flows that none of them saw. What others, classical fits and an upper-convected
 Maxwell fluid make of the same records is settled and stands in `docs/evidence.md`.
 """
 
@@ -109,7 +109,7 @@ NAMES = {
     ("tr(sigma)*gammadot",): "johnson_segalman",
     ("tr(sigma)*sigma",): "ptt_linear", ("(exp(epsilon*tr(sigma))-1)*sigma",): "ptt_exponential",
 }  # fmt: skip
-"""The name of a law beyond upper convected Maxwell by its terms."""
+"""The name of a law beyond upper-convected Maxwell by its terms."""
 
 
 def _ours(model, records: Records):

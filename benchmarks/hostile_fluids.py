@@ -95,7 +95,7 @@ class Elastoplastic(Material):
 
 
 def fractional(exponent: float = 0.5, modulus: float = 100.0, time: float = 1.0) -> Modes:
-    """Return upper convected modes whose G(t) is that of a spring and a springpot in a row.
+    """Return upper-convected modes whose G(t) is that of a spring and a springpot in a row.
 
     G(t) = G E_a(−(t/τ)^a) has the spectrum G sin(aπ)/π / (x^a + x^−a + 2 cos aπ) of x = t/τ, per
     ln τ   [Gorenflo & Mainardi 1997]; here two modes a factor of e from e^−4 to e^5.

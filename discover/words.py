@@ -33,8 +33,9 @@ def plainly(value: float) -> str:
 
 
 def percent_of(share: float) -> str:
-    """Return a share as a percentage, with two digits below a hundred and whole from there."""
-    return f"{100.0 * share:.2g} %" if abs(share) < 0.995 else f"{100.0 * share:.0f} %"
+    """Return a share as a percentage of two digits, of three from a hundred on."""
+    digits = 3 if 0.995 <= abs(share) < 9.995 else 2
+    return f"{float(f'{100.0 * share:.{digits}g}'):.6g} %"
 
 
 def p_value(probability: float) -> str:
@@ -144,7 +145,7 @@ _EFFECTS = {
     "non_affine_motion": "non-affine motion",
     "ptt_linear": "linear PTT",
     "ptt_exponential": "exponential PTT",
-    "rate_rise_time": "slow motor",
+    "rate_rise_time": "motor response time",
     "relaxation_mode": "added mode",
     "solvent_viscosity": "Newtonian viscosity",
     # whatever takes the torque away: of a broken edge runs alone say no more
@@ -155,7 +156,7 @@ _EFFECTS = {
     "thixotropic_modulus_by_stress": "stress-softened modulus",
     "thixotropic_relaxation": "rate-softened relaxation",
     "thixotropic_relaxation_by_stress": "stress-softened relaxation",
-    "thixotropic_relaxation_two_times": "two-time softened relaxation",
+    "thixotropic_relaxation_two_times": "relaxation with two structure times",
 }
 
 

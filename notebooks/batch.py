@@ -26,6 +26,7 @@ import matplotlib.pyplot as plt
 import pandas as pd
 
 import discover as dc
+from discover.batch.run import run_batch
 
 STUDY = """
 [data]
@@ -63,7 +64,7 @@ def stop_after_two(label, fraction):
 
 out = folder / "results"
 try:
-    dc.batch.run_batch(studies, out, progress=stop_after_two)
+    run_batch(studies, out, progress=stop_after_two)
 except KeyboardInterrupt:
     print("stopped")
 pd.read_csv(out / "table.csv")[["study", "outcome", "text"]]
@@ -79,7 +80,7 @@ pd.read_csv(out / "table.csv")[["study", "outcome", "text"]]
 
 # %%
 before = (out / "noise_01" / "loop.json").stat().st_mtime_ns
-result = dc.batch.run_batch(studies, out)
+result = run_batch(studies, out)
 assert (out / "noise_01" / "loop.json").stat().st_mtime_ns == before
 for study in result.studies:
     print(f"{study.status:<9}{study.name}: {study.text}")
@@ -136,6 +137,6 @@ law
 law.sympy()
 
 # %% [markdown]
-# `dc.batch.run_batch(studies, out, workers=2)` runs two studies at a time, `scheduler="tcp://host:8786"` all
+# `run_batch(studies, out, workers=2)` runs two studies at a time, `scheduler="tcp://host:8786"` all
 # that a cluster has room for; `docs/batches.md` says how to set one up under SLURM. Nothing is lost
 # if a worker dies.

@@ -13,7 +13,7 @@
 # %% [markdown]
 # # Closing the loop
 #
-# A fluid is declared to be upper convected Maxwell. It is not: the data come from a Giesekus fluid.
+# A fluid is declared to be upper-convected Maxwell. It is not: the data come from a Giesekus fluid.
 # The loop looks at the residual, scores the effects that the model may lack, in the fluid and in
 # the instrument, adds the best one, and tests it on runs that no fit saw. This notebook does that
 # first on data where the answer is known, then on a measured melt.
@@ -75,7 +75,7 @@ plt.show()
 # %% [markdown]
 # ## On measured data
 #
-# Start-up of a polyisoprene melt, declared as upper convected Maxwell with the spectrum of its own
+# Start-up of a polyisoprene melt, declared as upper-convected Maxwell with the spectrum of its own
 # linear sweep. Up to a strain of 0.4 linear theory should hold, and yet it misses the fast runs by
 # half. The loop fits the runs at −10 °C; those at −23 °C are held out as a test. The data are not
 # part of this project: without `DISCOVER_DATA` this part is skipped. More on them in

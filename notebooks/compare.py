@@ -14,7 +14,7 @@
 # # Two learners on identical data
 #
 # Eight oscillatory runs on a Giesekus fluid, shear stress only, with 1 % noise. The learners know
-# the upper convected Maxwell part and look for what is missing. Then we ask each for the normal
+# the upper-convected Maxwell part and look for what is missing. Then we ask each for the normal
 # stresses, which nobody measured, in a flow that neither saw.
 
 # %%

@@ -94,7 +94,7 @@ pd.Series(mobilities(free.coefficients()), name="should all be −0.3").round(3)
 # %% [markdown]
 # ## Frame invariance as constraints
 #
-# The upper convected production and the tensors of the library span all polynomials of this degree
+# The upper-convected production and the tensors of the library span all polynomials of this degree
 # that do not depend on the observer (and do not vanish in shear). So the coefficients of all three
 # equations together are a combination of five known matrices, one number each; and the number of
 # σ·σ cannot be positive, as a mobility is not negative: bounded least squares. (pysindy's

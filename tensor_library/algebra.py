@@ -163,7 +163,7 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
 
 
 def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
-    """Return L·σ + σ·Lᵀ, what the upper convected derivative subtracts from dσ/dt [Oldroyd 1950].
+    """Return L·σ + σ·Lᵀ, what the upper-convected derivative subtracts from dσ/dt [Oldroyd 1950].
 
     `stress`: (3, 3) with a full L, else four components with (4,) or () of L.
 

@@ -1,6 +1,6 @@
 """Laws of melts, solutions and gels as their authors write them, on full tensors.
 
-Each function returns what the upper convected derivative of the conformation A = I + σ is, with
+Each function returns what the upper-convected derivative of the conformation A = I + σ is, with
 time over the relaxation time; `stress` integrates it with scipy.
 """
 

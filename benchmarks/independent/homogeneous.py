@@ -23,7 +23,7 @@ class GiesekusFluid:
     """Giesekus modes with one mobility, and a solvent   [Giesekus 1982, JNNFM 11, 69].
 
     `modulus`, `relaxation_time`: of each mode, in Pa and s.
-    `mobility`: α of every mode; 0 is upper convected Maxwell.
+    `mobility`: α of every mode; 0 is upper-convected Maxwell.
     `solvent_viscosity` in Pa s.
     """
 

@@ -1,7 +1,7 @@
 """Whole experiments drawn by lot: a law, an instrument, a protocol and a noise, from scipy alone.
 
 Half of the laws and some of the flaws are in no library and no dictionary of the software under
-test. What is told of each is the upper convected Maxwell fluid with G = 100 Pa and λ = 1 s.
+test. What is told of each is the upper-convected Maxwell fluid with G = 100 Pa and λ = 1 s.
 """
 
 from collections.abc import Callable, Mapping

@@ -34,8 +34,8 @@ class Answer:
     `shift_factors`: a_T, relaxation times over those at `temperature_C`, by temperature of the runs
         in °C, where these were shifted.
     `error`, `noise`: relative residual of the fitted runs, and relative noise, mean over runs.
-    `discrepancy`: size of what it leaves, noise removed; None where unknown.
-    `expected_error`: by quantity of `QUANTITIES`; one that is missing is not measured.
+    `discrepancy`: size of what it leaves, noise subtracted; None where unknown.
+    `expected_error`: by quantity of `QUANTITIES`; one that is missing has no data.
     `equation`: law written out; None where it cannot be.
     `shown`: law as a page shows it where it cannot be written out, constants that differ from mode
         to mode at their mean.
@@ -117,11 +117,6 @@ class Answer:
     def expected(self, quantity: str) -> ExpectedError:
         """Return the expected error of a quantity."""
         return self.expected_error.get(quantity, ExpectedError())
-
-    def within_tolerance(self, quantity: str) -> bool | None:
-        """Return whether a quantity is expected within the tolerance; None where unknown."""
-        inside = self.expected(quantity).inside
-        return None if inside is None else inside <= self.tolerance
 
     @property
     def use(self) -> dict[str, Any] | None:

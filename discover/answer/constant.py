@@ -39,13 +39,14 @@ class Constant:
     def reciprocal(self) -> "Constant":
         """Its reciprocal, where the letter is that of one over it: γ̇c rather than 1/γ̇c."""
         ends = self.ci95 or (self.value, self.value)
-        if not self.letter.startswith("1/") or self.unit not in _RECIPROCAL or min(ends) <= 0.0:
+        is_reciprocal = self.letter.startswith("1/") and self.unit in _RECIPROCAL
+        if not is_reciprocal or self.value <= 0.0 or min(ends) < 0.0:
             return self
         low, high = ends
         return replace(
             self,
             value=1.0 / self.value,
-            ci95=None if self.ci95 is None else (1.0 / high, 1.0 / low),
+            ci95=None if self.ci95 is None else (1.0 / high, 1.0 / low if low else math.inf),
             unit=_RECIPROCAL[self.unit],
             letter=self.letter.removeprefix("1/"),
             end=_OTHER_END[self.end],
@@ -80,7 +81,7 @@ class Constant:
         if self.over_modes is not None:
             low, high = (significant(end, 2) for end in self.over_modes)
             small = abs(self.over_modes[0]) < _SMALL * abs(self.over_modes[1])
-            return f"{'up to ' if small else f'{low}–'}{high}{self._unit}"
+            return f"{0 if small else low}–{high}{self._unit}"
         if (other := self.reciprocal) is not self:
             return other.number
         return f"{self._plain(self.value)}{self._unit}"
@@ -97,6 +98,8 @@ class Constant:
         if self.bound:
             return self.bound
         low, high = self.ci95 or (math.nan, math.nan)
+        if high == math.inf:
+            return f"> {significant(low, 2)}"
         first, last = self._rounded(low), self._rounded(high)
         if first and last:
             return f"{first} to {last}" if low < 0.0 else f"{first}–{last}"
@@ -117,7 +120,8 @@ class Constant:
 
     def _plain(self, value: float) -> str:
         """Return a number of this constant without its unit."""
-        return self._rounded(value) or estimate(value, self.ci95)
+        rest = significant(value, 2) if self.may_be_absent else estimate(value, self.ci95)
+        return self._rounded(value) or rest
 
     def _rounded(self, value: float) -> str:
         """Return a number to two digits of the interval's width; empty where it needs a power.
@@ -155,7 +159,7 @@ class Constant:
         if not self.determined:
             return f"{self.symbol} not determined"
         measured = self.measured(level)
-        equals = "" if self.bound or measured.startswith("up to") else " ="
+        equals = "" if self.bound else " ="
         return f"{self.symbol}{equals} {measured}"
 
     def measured(self, level: str) -> str:
@@ -178,19 +182,23 @@ class Constant:
         The interval is over all laws that fit as well, in which it may be far from that value.
         """
         one = self.reciprocal  # as it is told
-        if not one.has_interval or one.ci95 is None:
+        if not one.has_interval or one.ci95 is None or one.may_be_absent:
             return False
         low, high = one.ci95
         return not _NEAR_END < (one.value - low) / (high - low) < 1.0 - _NEAR_END
 
     @property
-    def is_wide(self) -> bool:
-        """Whether its interval spans more than a decade."""
-        return (
-            self.has_interval
-            and self.ci95 is not None
-            and 0.0 < _DECADE * self.ci95[0] < self.ci95[1]
-        )
+    def may_be_absent(self) -> bool:
+        """Whether it is told as the reciprocal of a number that may be zero."""
+        ends = self.reciprocal.ci95
+        return ends is not None and ends[1] == math.inf
+
+    @property
+    def near_end(self) -> str:
+        """Near which end of its interval the value is; empty where near none."""
+        one = self.reciprocal
+        side = "lower" if one.ci95 and 2.0 * one.value < sum(one.ci95) else "upper"
+        return f"near the {side} end of its CI" if one.is_skewed or one.bound else ""
 
     @property
     def is_vague(self) -> bool:
@@ -210,9 +218,10 @@ class Constant:
         Also of a value at an end of an interval of decades, the other end of which says no more.
         """
         one = self.reciprocal
-        if one.ci95 is None or not (one.at_limit or one.is_wide):
+        low, high = one.ci95 or (0.0, 0.0)
+        is_wide = one.has_interval and 0.0 < _DECADE * low < high < math.inf
+        if one.may_be_absent or not (one.at_limit or is_wide):
             return ""
-        low, high = one.ci95
         if not one.at_limit:
             share = math.log(one.value / low) / math.log(high / low)
             if _NEAR_END < share < 1.0 - _NEAR_END:

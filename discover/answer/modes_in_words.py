@@ -85,12 +85,17 @@ FEW_MODES = 3
 
 
 def in_order(answer: Any) -> list[Any]:
-    """Return the modes from the shortest time to the longest."""
-    return sorted(answer.modes, key=lambda mode: mode.relaxation_time_s)
+    """Return the modes from the shortest time to the longest, then one that was added."""
+    return sorted(answer.modes, key=lambda one: (is_added(answer, one), one.relaxation_time_s))
+
+
+def is_added(answer: Any, mode: Any) -> bool:
+    """Return whether a mode was added to those that were declared."""
+    added = (one.value for one in answer.constants if one.letter.startswith("G_+"))
+    return any(math.isclose(mode.modulus_Pa, one, rel_tol=1e-6) for one in added)
 
 
 def as_constant(answer: Any, value: float) -> str:
     """Return a modulus, time or viscosity with the digits that it has among the constants."""
-    own = (one for one in answer.constants if math.isclose(one.value, value, rel_tol=1e-6))
-    one = next(own, None)
-    return significant(value, 3 if one is None else one.digits)
+    own = (c.digits for c in answer.constants if math.isclose(c.value, value, rel_tol=1e-6))
+    return significant(value, next(own, 3))

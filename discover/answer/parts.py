@@ -82,6 +82,8 @@ class Range:
     flows: tuple[str, ...] = ("shear",)
     oscillates: bool = True  # whether De is λω; else λ over the length of a run
     by_temperature: Mapping[float, "Range"] = field(default_factory=dict)
+    amplitude: Span | None = None  # of the strain, where each run oscillates at a finite one
+    steady: bool = False  # whether all runs are tables of steady states
 
     def to_json(self) -> dict[str, Any]:
         """Return the range as result files hold it."""
@@ -90,7 +92,7 @@ class Range:
         return own | {"by_temperature_C": measured} if measured else own
 
 
-_NOT_WRITTEN = ("oscillates", "by_temperature")
+_NOT_WRITTEN = ("oscillates", "by_temperature", "amplitude", "steady")
 
 
 @dataclass(frozen=True)
@@ -100,13 +102,13 @@ class ExpectedError:
     `inside`, `beyond`: inside the rates of the data and beyond them; None where unknown.
     `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
     `missing`: what stands in place of a number that is unknown.
-    `note`: why it is unknown, or on what it rests: ``not measured; if the law is right``.
+    `note`: why it is unknown, or on what it rests: ``no data: model spread``.
     """
 
     inside: float | None = None
     beyond: float | None = None
     beyond_at: str = ""
-    missing: Literal["not measured", "not determined"] = "not measured"
+    missing: Literal["no data", "not determined"] = "no data"
     note: str = ""
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
     is_residual: bool = False  # of fitted runs, which is no error to expect
@@ -130,3 +132,4 @@ class Discrepancy:
     by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
     grows_with_rate: float | None = None
     unseen: str = ""  # ``unseen runs`` where it is the error of such; empty: of fitted ones
+    met_up_to: str = ""  # rate up to which each run meets the tolerance; empty where all or none do

@@ -52,16 +52,16 @@ def _law(answer: Any, most: int) -> str:
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
-    # of a sum without a name the table has the constants; there moduli and times come first
+    # of a sum without a name the table has the coefficients; there moduli and times come first
     several = len(answer.modes) > 1
     own = [
         one for one in answer.constants
-        if (not several if one.name in _OF_MODES else not answer.is_empirical)
+        if not (several and one.name in _OF_MODES) and not (answer.is_empirical and one.is_term)
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
     certain = [one for one in own if one.determined and not one.is_vague]
     named = constants(certain[:most])
-    if several and not answer.is_empirical:
+    if several:
         # a solvent, or modes faster than the data: a melt has the one and no other
         and_viscosity = answer.solvent_viscosity_Pa_s and "eta_s" not in (one.name for one in own)
         named.append(counted(len(answer.modes), "mode") + " and η_s" * bool(and_viscosity))
@@ -70,7 +70,8 @@ def _law(answer: Any, most: int) -> str:
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     for one in answer.constants:
-        if one.name in OF_SWEEP and one.determined and differ(one.ci95, answer.tolerance):
+        known = one.name in OF_SWEEP and one.determined and not one.is_vague
+        if known and differ(one.ci95, answer.tolerance):
             level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
             named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None:
@@ -111,16 +112,17 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
 
 
 def description(answer: Any, brief: int = 0) -> str:
-    """Return how well the law describes the runs, corrected for what, and if that is enough.
+    """Return how well the law describes the runs, assuming what, and if that is enough.
 
     `brief`: 1 without counts of runs and names of suspects, 2 without other rates too.
     """
     if not answer.title:
         return ""
+    scatter = "point scatter" if answer.range.steady else "noise"
     noise = "" if answer.noise is None else percent_of(answer.noise)
     found = answer.discrepancy
     if answer.fits_to_the_noise:
-        said = f"Fits within the noise{f' of {noise}' if noise else ''}"
+        said = f"Fits within the {scatter}{f' of {noise}' if noise else ''}"
     elif found is None or not found.size:
         said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
     else:
@@ -143,7 +145,7 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
     And the worst of these, where one misses the tolerance, and those of faster runs.
     """
     each = [
-        f"{symbol} {_at_most(one.inside)}"
+        f"{symbol} {at_most(one.inside)}"
         for name, symbol in SYMBOLS.items()
         if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
     ]
@@ -151,38 +153,40 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
     if (worst := worst_run(answer)) is not None:
         more.append(f"worst run {worst[1]}")
     stress = answer.expected("sigma12")
-    if stress.beyond is not None and stress.beyond_at.startswith(MEASURED_AT) and brief < _BRIEFEST:
+    if stress.beyond is not None and stress.beyond_at.startswith(MEASURED_AT) and brief < 2:
         at = stress.beyond_at.removeprefix(MEASURED_AT).strip()
-        more.append(f"beyond range {_at_most(stress.beyond)} at {at}")
+        more.append(f"beyond range {at_most(stress.beyond)} at {at}")
     told = [*each, *more] if len(each) > 1 else [size, *more]
     if len(each) > 1 and more and answer.range.flows == ("shear",):  # these are runs of σ12
         told = [f"{each[0]} ({', '.join(more)})", *each[1:]]
     return f"Error on {answer.discrepancy.unseen}: {', '.join(told)}"
 
 
-_BRIEFEST = 2
-
-
 def _corrected(answer: Any, brief: int) -> str:
-    """Return what of the instrument the errors were corrected for; empty where for nothing."""
+    """Return what of the instrument the errors assume; empty where nothing."""
     names = [effect_title(one.effect) for one in answer.suspects]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
     told = listed(names) if few else f"{len(names)} measurement errors"
+    if len(names) == 1 and (one := answer.suspects[0]).amplitude and one.is_separate:
+        told += f" {one.amplitude.number}"
     # no instrument shapes what is measured in extension
-    what = "" if set(answer.range.flows) <= {"shear"} else "shear "
-    return f"{what}corrected for suspected {told}" if names else ""
+    what = "" if set(answer.range.flows) <= {"shear"} else " in shear"
+    return f"assuming {told}{what}" if names else ""
 
 
 _MOST_SUSPECTS = 2
 
 
 def tolerance(answer: Any, brief: int = 0) -> str:
-    """Return whether the tolerance is met, and unless `brief`, in how many runs it is not."""
+    """Return up to which rate the tolerance is met, else unless `brief` in how many runs."""
     if answer.adequate is None:
         return ""
     over, every = len(_over_tolerance(answer)), len(_by_run(answer))
-    missed = f"missed in {over} of {counted(every, 'run')}"
-    state = missed if over and not brief else "met" if answer.adequate else "missed"
+    state = "met" if answer.adequate else "missed"
+    if over and answer.discrepancy.met_up_to:
+        state = f"met up to {answer.discrepancy.met_up_to}"
+    elif over and (not brief or answer.adequate):
+        state = f"met in {every - over or 'none'} of {counted(every, 'run')}"
     return f"tolerance {percent_of(answer.tolerance)} {state}"
 
 
@@ -214,6 +218,7 @@ def usable(answer: Any) -> tuple[list[str], list[str]]:
         fitted = ("shear" if name == "sigma12" else name) in flows
         most = _USELESS if one.is_measured else answer.tolerance
         if fitted if one.inside is None else one.inside <= most:
+            symbol = "steady shear stress" if name == "sigma12" and answer.range.steady else symbol
             (tested if one.is_measured else implied).append(symbol)
     tested += [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
     return tested, implied
@@ -227,8 +232,9 @@ def where(answer: Any) -> str:
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     only = " only" * (len(quantities) == 1 and not implied)
-    use = f"If {percent_of(answer.size)} suffices, use" if answer.adequate is False else "Use"
-    more = f" ({listed(implied)} if the law is right)" if implied else ""
+    _, least = worst_run(answer) or ("", percent_of(answer.size) * (answer.adequate is False))
+    use = f"Where {least} suffices, use" if least else "Use"
+    more = f" ({listed(implied)}: predicted, not measured)" if implied else ""
     return f"{use} for {listed(quantities)}{only}{more}, {place}."
 
 
@@ -245,7 +251,8 @@ def _place(answer: Any) -> str:
             near = one.deborah[0] < _NEARLY_STEADY
             ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
             slow = f", {'steady or ' * near}oscillating at De = λω {ends}"
-        return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{slow}"
+        rate = "" if one.rate_1_s is None else f" ({modes.short(one.rate_1_s[1])} 1/s)"
+        return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{rate}{slow}"
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
         return f"{rates}{reduced}" if (rates := _rates(one)) else ""
@@ -257,7 +264,10 @@ _NEARLY_STEADY = 0.5  # Deborah number below which a fluid relaxes several times
 
 
 def _rates(one: Any) -> str:
-    """Return the rates of a range, and the frequencies of what oscillates."""
+    """Return the rates of a range and the frequencies of what oscillates, or its amplitudes."""
+    if one.amplitude is not None and one.frequency_rad_s is not None:
+        at = f"oscillatory shear at {modes.span(one.frequency_rad_s)} rad/s"
+        return f"{at}, strain amplitude {modes.span(one.amplitude)}"
     found = [] if one.rate_1_s is None else [f"{modes.span(one.rate_1_s)} 1/s"]
     if (frequencies := one.frequency_rad_s) is not None:
         several = any(sign in (told := modes.span(frequencies)) for sign in ("–", " to "))
@@ -328,24 +338,25 @@ def errors(answer: Any) -> list[Row]:
 
 def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
-    of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
-    return f"{of}, noise removed"
+    of = "Fit residual" if answer.expected("sigma12").is_residual else "Model error"
+    return f"{of} (noise subtracted)"
 
 
 def note(answer: Any, quantity: str) -> str:
-    """Return on what an expected error rests, and that it is more than the tolerance."""
-    above = "above tolerance" if answer.within_tolerance(quantity) is False else ""
-    return ", ".join(filter(None, [answer.expected(quantity).note, above]))
+    """Return on what an error rests, and that one measured is more than the tolerance."""
+    one = answer.expected(quantity)
+    missed = one.is_measured and (one.inside or 0.0) > answer.tolerance
+    return ", ".join(filter(None, [one.note, "above tolerance" * missed]))
 
 
 def _error(one: Any, value: float | None) -> str:
     """Return an expected error, or why there is none."""
     if value is not None:
-        return _at_most(value) if value else "within noise"
-    return "not measured" if one.is_known else one.missing
+        return at_most(value) if value else "within noise"
+    return "no data" if one.is_known else one.missing
 
 
-def _at_most(value: float) -> str:
+def at_most(value: float) -> str:
     """Return a relative error; of one that is large only that it is."""
     return percent_of(value) if value <= MUCH else f"> {percent_of(MUCH)}"
 

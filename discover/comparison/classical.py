@@ -17,7 +17,7 @@ from discover.loop.loop import Found
 from discover.loop.task import with_law
 
 _AS_EFFECTS = {"ucm": (), **{law: (effect,) for effect, law in LAW_OF_EFFECT.items()}}
-"""Effects that make each law of upper convected Maxwell."""
+"""Effects that make each law of upper-convected Maxwell."""
 
 _STARTS = (0.03, 0.3)
 """Shares of the range of a constant from which its fits start."""
@@ -80,7 +80,7 @@ def _with(found: Found, law: str) -> DeclaredModel:
 
 
 def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
-    """Return the classical laws as effects added to upper convected Maxwell."""
+    """Return the classical laws as effects added to upper-convected Maxwell."""
     declared = _with(found, "ucm")
     names = {name for some in _AS_EFFECTS.values() for name in some}
     problem = found.task.problem(declared, [*map(make_effect, sorted(names)), *bench])

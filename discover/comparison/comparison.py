@@ -209,7 +209,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
 
     @property
     def known_or_maxwell(self) -> Equation:
-        """The known part below what learners found; upper convected Maxwell if unsaid."""
+        """The known part below what learners found; upper-convected Maxwell if unsaid."""
         return self.known or Equation(())
 
     def equation(self, learner: str) -> Equation:

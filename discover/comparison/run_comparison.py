@@ -69,7 +69,7 @@ def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
     """Return what was known before, and what was fitted with the likeliest hypothesis."""
     text = f"{frame.model.described}, {frame.model.modes_in_words}"
     if not study.model.known_relaxation:
-        text = "upper convected Maxwell without its relaxation term (a purely elastic solid)"
+        text = "upper-convected Maxwell without its relaxation term (a purely elastic solid)"
     if declared.free_constants:
         text += f" ({', '.join(declared.free_constants)} fitted)"
     if frame.effects:

@@ -150,7 +150,7 @@ RATE_RISE_TIME = RateRiseTime(
     equation=r"t_\mathrm{m}\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt}"
     r" = \dot\gamma",
     source="Macosko 1994, Rheology, ch. 8: response time of the drive",
-    check="Record the angle of the motor in start-up.",
+    check="Record the motor's angle in start-up.",
     visible="t_m of about 5 % of the time in which the stress grows.",
 )  # fmt: skip
 

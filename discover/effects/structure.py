@@ -1,6 +1,6 @@
 """A structure of the fluid that flow breaks and rest mends, on which the stress depends."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import jax.numpy as jnp
@@ -106,6 +106,7 @@ BUILD_UP_TIME = EffectParameter(
     meaning="build-up time",
     range_source="as for thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
 )  # fmt: skip
+_FAST = replace(BUILD_UP_TIME, meaning="fast build-up time")
 
 EXPONENT = EffectParameter(
     "exponent", "m", low=0.1, high=4.0, first_trial=1.0,
@@ -115,7 +116,8 @@ EXPONENT = EffectParameter(
 )  # fmt: skip
 
 SLOWNESS = EffectParameter(
-    "slowness", "R", low=2.0, high=1e4, first_trial=30.0, meaning="slow over fast structure time",
+    "slowness", "R", low=2.0, high=1e4, first_trial=30.0,
+    meaning="ratio of slow to fast build-up time",
     range_source="structure times less than a factor of two apart count as one (those of Wei, "
     "Solomon & Larson 2018 spread over decades)",
 )  # fmt: skip
@@ -133,14 +135,14 @@ def _one_structure(
 ) -> Structure:  # fmt: skip
     """Return a structure; its equation follows from what it scales and what breaks it."""
     scaled = {"modulus": "G_k", "time": r"\lambda_k"}[scales]
-    letter = {"rate": r"\dot\gamma", "stress": r"\sigma"}[broken_by]
+    letter = {"rate": r"\dot\gamma", "stress": r"\sigma_{12}"}[broken_by]
     return Structure(
         name=name,
         parameters=(
             INVERSE_RATE if broken_by == "rate" else INVERSE_STRESS, BUILD_UP_TIME, EXPONENT,
         ),
         equation=rf"{scaled} \to s\,{scaled},\quad t_\mathrm{{b}}\frac{{ds}}{{dt}} = 1 - s"
-        rf" - \left(\frac{{|{letter}|}}{{{letter}_\mathrm{{c}}}}\right)^m s",
+        rf" - \left(\frac{{|{letter}|}}{{{letter.partition('_')[0]}_\mathrm{{c}}}}\right)^m s",
         source=source,
         check=check,
         visible=f"largest {broken_by} over the critical one, to the power m, of about 0.05, over "
@@ -178,7 +180,7 @@ THIXOTROPIC_RELAXATION_BY_STRESS = _one_structure(
 
 THIXOTROPIC_RELAXATION_TWO_TIMES = TwoStructures(
     name="thixotropic_relaxation_two_times",
-    parameters=(INVERSE_RATE, BUILD_UP_TIME, SLOWNESS, SLOW_SHARE),
+    parameters=(INVERSE_RATE, _FAST, SLOWNESS, SLOW_SHARE),
     equation=r"\lambda_k \to [(1 - w) s_1 + w s_2]\,\lambda_k,\quad t_i\frac{ds_i}{dt} = 1 - s_i"
     r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^{2/3} s_i,"
     r"\quad t_1 = t_\mathrm{b},\ t_2 = R\,t_\mathrm{b}",

@@ -158,7 +158,7 @@ class DeclaredModel:
 
     @classmethod
     def maxwell(cls, modulus, relaxation_time, **options) -> "DeclaredModel":
-        """Return the upper convected Maxwell law with these modes."""
+        """Return the upper-convected Maxwell law with these modes."""
         return cls(
             UpperConvectedMaxwell(),
             np.atleast_1d(modulus),

@@ -49,7 +49,7 @@ class Fluid(eqx.Module):
     Attributes
     ----------
     law
-        Dimensionless law, by default upper convected Maxwell; `LawOfEachMode` where constants
+        Dimensionless law, by default upper-convected Maxwell; `LawOfEachMode` where constants
         differ.
     modulus, relaxation_time
         G_k in Pa and λ_k in s, shape (k,).
@@ -165,7 +165,7 @@ class Fluid(eqx.Module):
         sweep
             Small-amplitude data, such as `Dataset.linear_sweep`.
         law
-            Of every mode; by default upper convected Maxwell.
+            Of every mode; by default upper-convected Maxwell.
         **options
             `modes`, known `solvent_viscosity` and `elastic_modulus`, as of
             `discover.dataset.relaxation_spectrum`.

@@ -49,7 +49,7 @@ LAW_OF_EFFECT = {
     "ptt_linear": "ptt_linear",
     "ptt_exponential": "ptt_exponential",
 }
-"""Laws that an effect makes of an upper convected Maxwell fluid."""
+"""Laws that an effect makes of an upper-convected Maxwell fluid."""
 
 _NOT_TESTED = {
     "flows": "Not tested on unseen runs.",
@@ -207,7 +207,7 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     name, least = _MAXIMUM.get(near.law, ("", 0.0))
     has_maximum = name in near.constants and near.constants[name].value > least
-    maximum = ", flow curve with a maximum" if has_maximum else ""
+    maximum = ", non-monotonic flow curve" if has_maximum else ""
     return f"{', '.join(said)}{maximum}", near.size
 
 
@@ -251,7 +251,10 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
             found = _law_first(base[1], found)
         if first or added:
             title = f"{title} with {listed([*first, *added])}"
-        if len(added) > _MOST_ADDED or any(one.is_term for one in found):
+        # more constants than runs, which they do not describe either
+        many = len(found) > sum(not record.held_out for record in result.records)
+        many &= result.verdict not in EXPLAINED
+        if many or len(added) > _MOST_ADDED or any(one.is_term for one in found):
             title = EMPIRICAL + title
         return None, title, tuple(found)
     name, values = named
@@ -259,7 +262,18 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
     if name == "ucm" and not shows_a_derivative(result):
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
-    return name, title, tuple(_law_first(values, found))
+    assert equation is not None
+    part = equation.named
+    own = {} if part is None else {n: [c[n] for c in part.constants] for n in part.differing}
+    return name, title, tuple(_over_modes(one, own) for one in _law_first(values, found))
+
+
+def _over_modes(one: Constant, by_mode: Mapping[str, Sequence[float]]) -> Constant:
+    """Return a constant with its mean and ends over the modes, where a law has one for each."""
+    values = by_mode.get(one.name)
+    if values is None or one.over_modes is not None:
+        return one
+    return replace(one, value=float(np.mean(values)), over_modes=(min(values), max(values)))
 
 
 def shows_recovery(records: Sequence[RunRecord]) -> bool:

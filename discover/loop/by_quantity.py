@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
-from discover.answer.sentences import MEASURED_AT, MUCH
+from discover.answer.sentences import MEASURED_AT, at_most
 from discover.loop.fitted_range import by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
@@ -26,8 +26,8 @@ FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
 _UNSEEN, _FITTED = "unseen runs", "fitted runs"
-
-_TWICE = f"predicted at {BEYOND:g}× the rate"
+_LEFT_OUT, _HELD_OUT = "cross-validation", "validation runs"
+_TWICE = "estimated at twice the highest rate"
 
 
 def beyond_noise(error: float, noise: float | None) -> float:
@@ -58,21 +58,30 @@ def with_unseen(result: Any) -> Discrepancy | None:
         found,
         size=size,
         ci95=(float(ends[0]) * size, float(ends[1]) * size),
-        by_run={**found.by_run, **errors},
+        by_run=(by_run := {**found.by_run, **errors}),
         unseen=_UNSEEN,
+        met_up_to=_met_up_to(result, by_run),
     )
 
 
+def _met_up_to(result: Any, by_run: Mapping[str, float]) -> str:
+    """Return the rate up to which all runs meet the tolerance; empty where all do, or none."""
+    own = sorted((r for r in result.records if r.name in by_run), key=lambda r: r.fastest)
+    missed = [r.fastest for r in own if by_run[r.name] > result.tolerance]
+    met = [r for r in own if missed and FASTER * r.fastest < missed[0]]
+    several = len(by_temperature(own)) > 1 or len({(r.flow, r.quantity) for r in own}) > 1
+    return "" if several or not met else f"{span((met[-1].unshifted.fastest,) * 2)} 1/s"
+
+
 def _which(result: Any, own: Mapping[str, float]) -> str:
-    """Return that errors are of unseen runs; the two means where some were held out, not all."""
+    """Return of which unseen runs errors are; the two means where they are of both."""
     left = {*result.left_out, *(fold.run for fold in result.folds)}
-    turns = [error for name, error in own.items() if name in left]
-    held = [error for name, error in own.items() if name not in left]
-    if not held or not turns:
-        return _UNSEEN if own else ""
-    kinds = ("left out in turn", _mean(turns)), ("held out", _mean(held))
-    said = [f"{kind} {percent_of(one)}" for kind, one in kinds if one is not None]
-    return f"{_UNSEEN}: {', '.join(said)}"
+    kinds: dict[str, list[float]] = {}
+    for name, error in own.items():
+        kinds.setdefault(_LEFT_OUT if name in left else _HELD_OUT, []).append(error)
+    means = {kind: _mean(errors) for kind, errors in sorted(kinds.items())}
+    said = [f"{kind} {percent_of(one)}" for kind, one in means.items() if one is not None]
+    return f"{', '.join(said)}, pooled" if len(kinds) > 1 else "".join(kinds)
 
 
 def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
@@ -122,20 +131,17 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
             found[kind] = own
             continue
         apart = differing(result, kind)
-        much = apart is not None and apart > MUCH  # of laws that diverge only that it is much
-        by = f"more than {percent_of(MUCH)}" if much else percent_of(apart or 0.0)
-        differ = "" if apart is None else f"laws that fit as well differ by {by}"
+        differ = "" if apart is None else f"model spread {at_most(apart)}"
+        above = f" > {percent_of(_APART)}" if apart is not None and apart >= _APART else ""
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
-            note = "not measured: spread of laws that fit as well"
+            note = "no data: model spread"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
-        elif kind == "N1" and differ:
-            found[kind] = ExpectedError(missing="not determined", note=differ)
         elif kind == "N2":
             found[kind] = _second_difference(result, differ)
-        elif apart is not None and apart >= _APART:
-            found[kind] = ExpectedError(missing="not determined", note=differ)
+        elif above or (kind == "N1" and differ):
+            found[kind] = ExpectedError(missing="not determined", note=f"{differ}{above}")
         else:
             found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
     return found
@@ -145,11 +151,12 @@ def _second_difference(result: Any, differ: str) -> ExpectedError:
     """Return what is said of N2 where nothing measured it: that of the law, unless laws differ."""
     apart, spread = differing(result, "N2"), result.spread_of_laws.get("N2")
     if apart and apart > _WORTH_SAYING:
-        return ExpectedError(missing="not determined", note=f"{differ} of N1")
+        note = f"{differ} of N1 > {percent_of(_WORTH_SAYING)}"
+        return ExpectedError(missing="not determined", note=note)
     ratio = None if spread is None else spread.over_n1
     if ratio is None:
         return ExpectedError()
-    share = "0" if abs(ratio) < _NOTHING else f"{percent_of(ratio)} of N1".replace("-", "−")
+    share = "0" if abs(ratio) < _NOTHING else f"rms {percent_of(ratio)} of N1".replace("-", "−")
     return ExpectedError(note=f"{share} by this law")
 
 
@@ -199,7 +206,10 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
     inside, beyond = (
         _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )
-    note = _UNSEEN if held else _FITTED
+    note = _HELD_OUT if held else _FITTED
+    if held and slow:
+        rates = [record.unshifted.fastest for record in slow]
+        note += f", {span((min(rates), max(rates)))} 1/s"
     return ExpectedError(inside, beyond, _measured_at(fast), note=note, is_residual=not held)
 
 

@@ -56,6 +56,7 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
     box = None if equation is None or equation.tested is None else equation.tested.learned_in
     # one that turns has a frequency besides its rate
     found = [flow_numbers(r.time, r.rate, 1.0)[1] for r in turned]
+    sizes = [0.5 * float(np.nanmax(r.strain) - np.nanmin(r.strain)) for r in turned]
     return Range(
         None if box is None else box.weissenberg,
         None if box is None else box.deborah,
@@ -64,6 +65,8 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
         (min(found), max(found)) if found else None,
         flows,
         bool(turned),
+        amplitude=(min(sizes), max(sizes)) if sizes and len(sizes) == len(fitted) else None,
+        steady=bool(fitted) and all(r.control == "steady" for r in fitted),
     )
 
 

@@ -15,7 +15,7 @@ STRUCTURES = (
     "thixotropic_relaxation_by_stress",
     "thixotropic_relaxation_two_times",
 )
-"""Effects that make a thixotropic fluid of an upper convected Maxwell fluid."""
+"""Effects that make a thixotropic fluid of an upper-convected Maxwell fluid."""
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
 

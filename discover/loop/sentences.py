@@ -5,7 +5,7 @@ from typing import Any
 
 from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, differ
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.runs import RunRecord
 
@@ -62,8 +62,8 @@ def what_to_measure_next(result: Any) -> str:
     faster = f"a shear rate above {_fastest(result.records)}"
     if result.verdict == "no_signal":
         return (
-            "Check that the sensor is connected and the sample loaded; use a larger sample, a more "
-            f"sensitive transducer, or {faster}."
+            "Check that the sensor is connected and the sample loaded; use a larger plate or cone, "
+            f"a more sensitive transducer, or {faster}."
         )
     if result.material is not None:
         return result.stages[0].check
@@ -99,7 +99,7 @@ def _of_sweep(result: Any) -> str:
     fitted = [one for name, one in result.declared_parameters.items() if name in OF_SWEEP]
     if not any(differ(one.ci95, result.tolerance) for one in fitted if not one.is_open):
         return ""
-    return "Repeat the frequency sweep on the loading of these runs."
+    return "Repeat the frequency sweep on the same loaded sample as these runs."
 
 
 def _fastest(records: Sequence[RunRecord]) -> str:
@@ -132,7 +132,19 @@ def _of_another_stress(result: Any) -> str:
             continue
         if _is_in_reach(result, kind):
             apart_by = f"equally good laws differ by {words.percent_of(apart)}"
-            return f"{title} at {_fastest(_sheared(result))}: {apart_by}."
+            said = f"{title} at {_fastest(_sheared(result))}: {apart_by}."
+            return f"{also} and {_as_clause(said)}." if (also := _unfitted(result)) else said
+    return ""
+
+
+def _unfitted(result: Any) -> str:
+    """Return that a fit to what was held out alone comes first; empty where it is described."""
+    fitted = {(r.flow, r.quantity) for r in result.records if not r.held_out}
+    others = [r for r in result.records if (r.flow, r.quantity) not in fitted]
+    for kind in ("N1", "uniaxial"):
+        own = measured(others, kind, result.noise_floor)
+        if own is not None and (error := own.inside or own.beyond or 0.0) > result.tolerance:
+            return f"Fit {SYMBOLS[kind]} too (error {words.percent_of(error)}),"
     return ""
 
 

@@ -34,9 +34,10 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             if one.is_term:
                 symbols[i] = one.symbol.replace("σ", "τ")
                 headline = headline.replace(one.symbol, symbols[i])
-    reduced = modes.reduced_to(answer)
+    ends = answer.range.rate_1_s
     shifted = [
-        ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)} than at {reduced}",
+        ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)}"
+         + unbroken(f"; range {modes.span((ends[0] / one, ends[1] / one))} 1/s" if ends else ""),
          words.significant(one, 3), "") for at, one in modes.shifts(answer)
     ]  # fmt: skip
     timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
@@ -47,7 +48,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "headline": headline,
         "quality": quality,
         "errors": sentences.error_title(answer).lower(),
-        "open": not answer.title or answer.adequate is False,
+        "open": not answer.title or answer.adequate is False or bool(sentences.worst_run(answer)),
         "law": _typeset(answer),
         "constants": [
             *((symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
@@ -67,9 +68,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 
 def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is possible."""
-    skewed = "at an end of its interval" if one.is_skewed or one.bound else ""
-    at_end = "at its physical limit" if one.at_limit else skewed
-    return "; ".join(filter(None, [one.said, at_end]))
+    at_end = "at its physical limit" if one.at_limit else one.near_end
+    return "; ".join(filter(None, [one.said, at_end, "may be absent" * one.may_be_absent]))
 
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
@@ -96,11 +96,21 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
 
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
-    lines = answer.written.get("formula", "").splitlines()
+    lines = [*_of_sweep(answer), *answer.written.get("formula", "").splitlines()]
     if equation is None:
         return _formulas(lines)
     rest = any(line.startswith("h = ") for line in lines)
     return _law(_rounded(equation, answer), rest) + _formulas(lines)
+
+
+def _of_sweep(answer: Answer) -> list[str]:
+    """Return how the modes follow from those of the sweep, in LaTeX; empty where they are these."""
+    letters = {"modulus_factor": "G", "relaxation_time_factor": r"\lambda"}
+    factors = [(letters[c.name], c.number) for c in answer.constants if c.name in letters]
+    parts = [rf"{letter}_k = {number}\,{letter}_{{0k}}" for letter, number in factors]
+    if parts and any(modes.is_added(answer, mode) for mode in answer.modes):
+        parts = [rf"k = 1,\ldots,{len(answer.modes) - 1},+", *(rf"{p}\ (k \neq +)" for p in parts)]
+    return [r",\quad".join(parts)] if parts else []
 
 
 def _rounded(equation: Equation, answer: Answer) -> Equation:

@@ -217,7 +217,7 @@ def error_rows(result: LoopResult) -> list[dict[str, Any]]:
     def errors(held_out: bool, model: int) -> list[float]:
         return [float(r.errors[model]) for r in result.records if r.held_out is held_out]
 
-    names = ["your model", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
+    names = ["starting model", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     rows = [
         {

@@ -204,7 +204,7 @@ def _text(
         if named.differing:
             below = f"{LAWS[named.law].title}, {', '.join(named.differing)} by mode"
     terms = f"{counted(n, 'term')} added to {below}" if n else below
-    terms = terms if n or named else "upper convected Maxwell"
+    terms = terms if n or named else "upper-convected Maxwell"
     text = f"Taken from {file.parent.name}: {law} ({terms}) with "
     text += counted(modes, "relaxation mode")
     times = equation.relaxation_time

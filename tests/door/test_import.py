@@ -256,6 +256,6 @@ def test_simulate_is_a_function_and_a_package():
     times = np.linspace(0.0, 3.0, 7)
     fluid = dc.Fluid(modulus=2.0, relaxation_time=1.5)
     stress = dc.simulate(fluid, dc.start_up(0.1), times).shear_stress
-    # closed form of upper convected Maxwell; 1e-8 is the tolerance of the integration
+    # closed form of upper-convected Maxwell; 1e-8 is the tolerance of the integration
     np.testing.assert_allclose(stress, 0.3 * (1.0 - np.exp(-times / 1.5)), atol=1e-7)
     assert dc.simulate.SimulationError

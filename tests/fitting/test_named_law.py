@@ -88,7 +88,7 @@ def test_a_wrong_law_is_said_to_leave_a_systematic_misfit(data):
 def test_a_solvent_is_found_beside_a_maxwell_mode():
     viscosity, modulus, time = 12.0, 50.0, 1.2
 
-    def oldroyd_b(rate, times):  # closed form of the upper convected Maxwell start-up
+    def oldroyd_b(rate, times):  # closed form of the upper-convected Maxwell start-up
         return rate * (modulus * time * (1.0 - np.exp(-times / time)) + viscosity)
 
     found = dc.fit("ucm", data_of(oldroyd_b, (0.3, 1.0)), effects={"solvent_viscosity": "fit"})
@@ -172,7 +172,7 @@ def test_a_fit_has_the_answer_of_the_other_commands(fitted):
 def test_a_solvent_that_is_fitted_is_the_whole_one():
     viscosity, modulus, time = 12.0, 50.0, 1.2
 
-    def oldroyd_b(rate, times):  # closed form of the upper convected Maxwell start-up
+    def oldroyd_b(rate, times):  # closed form of the upper-convected Maxwell start-up
         return rate * (modulus * time * (1.0 - np.exp(-times / time)) + viscosity)
 
     omega = np.geomspace(0.01, 100.0, 25)

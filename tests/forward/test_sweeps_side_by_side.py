@@ -67,7 +67,7 @@ def giesekus(strain, frequency, mobility):
 
 
 def test_a_maxwell_fluid_has_its_closed_moduli_at_every_strain(asked):
-    # σ12 of an upper convected Maxwell fluid is linear in the strain; a gain multiplies the record
+    # σ12 of an upper-convected Maxwell fluid is linear in the strain; a gain multiplies the record
     gains = np.linspace(0.0, 0.16, 9)
     found = predicted(asked, [{"stress_gain": gain} for gain in gains])
     w = FREQUENCIES[:, None]

@@ -79,7 +79,7 @@ def test_two_modes_are_those_of_full_tensors_in_every_flow(name, kind, rate):
     "name", ["pom_pom_drag_strain", pytest.param("pom_pom", marks=pytest.mark.slow)]
 )
 def test_steady_shear_is_the_closed_form_that_has_a_maximum(name):
-    """A is upper convected Maxwell's: A11 = 1 + 2 Wi², A12 = Wi; McLeish & Larson 1998, eq. 39."""
+    """A is upper-convected Maxwell's: A11 = 1 + 2 Wi², A12 = Wi; McLeish & Larson 1998, eq. 39."""
     # at the fastest the logarithm of tr A used to run away, and a stress of a wrong sign was steady
     rates = np.array([0.1, 0.5, 1.0, 2.0, 5.0, 20.0, 1e3, 1e4, 1e5])
     found = predicted(name, steady_rates(rates), np.arange(1.0, 10.0), rates)

@@ -60,8 +60,8 @@ def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     assert with_unseen(result(FITTED)).unseen == "unseen runs"
     # where runs were left out in turn and others held out, the table has the mean of each
     both = errors_by_quantity(found)["sigma12"].note
-    assert both == "unseen runs: left out in turn 6 %, held out 12 %"
-    assert errors_by_quantity(result(FITTED))["sigma12"].note == "unseen runs"
+    assert both == "cross-validation 6 %, validation runs 12 %, pooled"
+    assert errors_by_quantity(result(FITTED))["sigma12"].note == "cross-validation"
 
 
 def ended(verdict, known=None):
@@ -103,7 +103,7 @@ def test_a_run_beyond_the_rates_does_not_count_inside():
     assert errors.beyond == pytest.approx(np.sqrt(0.5**2 - NOISE**2))
     assert errors.beyond_at == "measured at 3 1/s"
     computed = errors_by_quantity(result(FITTED, spread_of_laws={"sigma12": Spread(0.1, 0.2)}))
-    assert computed["sigma12"].beyond_at == "predicted at 2× the rate"
+    assert computed["sigma12"].beyond_at == "estimated at twice the highest rate"
 
 
 def test_fitted_runs_alone_are_a_residual():
@@ -136,18 +136,18 @@ def test_each_quantity_has_the_error_of_its_own_unseen_runs():
 def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
     close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09)}
     told = errors_by_quantity(result(FITTED, spread_of_laws=close))
-    assert told["N1"].note == "not measured: spread of laws that fit as well"
-    assert told["N2"].note == "−9 % of N1 by this law"
-    assert told["N2"].missing == "not measured"
+    assert told["N1"].note == "no data: model spread"
+    assert told["N2"].note == "rms −9 % of N1 by this law"
+    assert told["N2"].missing == "no data"
     assert not told["N2"].is_known
     affine = {**close, "N2": Spread(0.0, 0.0, 1e-9)}  # but for the integrator
     assert errors_by_quantity(result(FITTED, spread_of_laws=affine))["N2"].note == "0 by this law"
     wide = {**close, "N2": Spread(0.3, 0.4, -0.09)}
     unsettled = errors_by_quantity(result(FITTED, spread_of_laws=wide))["N2"]
     assert unsettled.missing == "not determined"
-    assert unsettled.note == "laws that fit as well differ by 30 % of N1"
+    assert unsettled.note == "model spread 30 % of N1 > 5 %"
     apart = errors_by_quantity(result(FITTED))
-    assert apart["N1"].note == "laws that fit as well differ by 60 %"
+    assert apart["N1"].note == "model spread 60 % > 20 %"
     assert {apart[kind].missing for kind in ("N1", "uniaxial")} == {"not determined"}
 
 
@@ -184,7 +184,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
 
 def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
     factor = StageParameter(0.52, (0.04, 0.79), "1")
-    again = "Repeat the frequency sweep on the loading of these runs."
+    again = "Repeat the frequency sweep on the same loaded sample as these runs."
     for name in ("modulus_factor", "relaxation_time_factor"):
         assert what_to_measure_next(close(declared_parameters={name: factor})) == again
     # the first is next to one, within the tolerance of 10 %, and the last is no value
@@ -253,6 +253,43 @@ def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement(
     assert not range_of([*fitted, FITTED[0]]).by_temperature
     at_reference = replace(FITTED[0], conditions={"temperature_C": -35.0})
     assert list(range_of([*fitted, at_reference]).by_temperature) == [-10.0, -35.0]
+
+
+def test_a_tolerance_is_met_up_to_the_rate_below_the_slowest_run_that_misses_it():
+    names = [one.name for one in FITTED]
+    for own, met in (((0.01, 0.02, 0.06), "0.3 1/s"), ((0.01, 0.06, 0.02), "0.1 1/s"),
+                     ((0.06, 0.01, 0.01), ""), ((0.01, 0.02, 0.03), "")):  # fmt: skip
+        told = with_unseen(result(FITTED, left_out=dict(zip(names, own, strict=True))))
+        assert told.met_up_to == met
+    # a stress and an extension have no rates in common
+    pulled = replace(record("pulled", 3.0, 0.5, quantity="tensile_stress"), flow="uniaxial")
+    left = {"slow": 0.01, "middle": 0.02, "fast": 0.03, "pulled": 0.5}
+    assert not with_unseen(result([*FITTED, pulled], left_out=left)).met_up_to
+
+
+def test_extension_that_was_held_out_and_is_missed_is_to_be_fitted_first():
+    held = record("pulled", 0.3, 0.5, held_out=True, quantity="tensile_stress")
+    told = what_to_measure_next(close([*FITTED, replace(held, flow="uniaxial")]))
+    error = 100.0 * np.sqrt(0.5**2 - NOISE**2)
+    assert told == (
+        f"Fit uniaxial extension too (error {error:.0f} %), and measure N1 at 1 1/s: equally good "
+        "laws differ by 60 %."
+    )
+    near = replace(held, flow="uniaxial", errors=np.array([0.06]))  # within the tolerance of 10 %
+    assert what_to_measure_next(close([*FITTED, near])).startswith("Measure N1")
+
+
+def test_an_oscillation_has_the_amplitude_of_its_strain_and_a_table_of_states_is_steady():
+    time = np.linspace(0.0, 4.0 * np.pi, 801)
+    wave = RunRecord(
+        "wave", False, time, 0.4 * np.sin(2.0 * time), time, 0.8 * np.cos(2.0 * time),
+        np.ones(801), np.ones((1, 801)), np.array([0.1]),
+    )  # fmt: skip
+    told = range_of([wave])
+    assert told.amplitude == pytest.approx((0.4, 0.4), rel=1e-3)  # its samples miss the peak
+    assert range_of([wave, FITTED[0]]).amplitude is None
+    assert range_of([replace(FITTED[0], control="steady")]).steady
+    assert not range_of(FITTED).steady
 
 
 def test_a_range_of_rates_is_where_runs_stay():

@@ -124,7 +124,7 @@ def test_a_loop_names_a_yield_stress_without_a_search():
     assert found.use["law"] == "herschel_bulkley"
     assert found.use["constants"]["yield_stress_Pa"]["unit"] == "Pa"
     assert "stress(rate)" in found.answer.written["python"]
-    assert "Use for σ12 only, 0.01–100 1/s" in found.answer.written["python"]
+    assert "Use for steady shear stress only, 0.01–100 1/s" in found.answer.written["python"]
 
 
 def test_a_comparison_says_the_same_and_asks_no_learner(tmp_path):

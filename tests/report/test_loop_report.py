@@ -313,7 +313,7 @@ def test_effects_are_named_only_where_some_were_added():
         assert "with effects" in draw(with_stage).svg
         drawn = draw(without).svg
         assert "with effects" not in drawn
-        assert "your model" in drawn
+        assert "starting model" in drawn
         assert "→" not in drawn
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import sympy
 
 PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
-% The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.
+% The triangle marks the upper-convected derivative. Needs amsmath and bm or boldsymbol.
 """
 """First lines of a file with laws."""
 

@@ -224,7 +224,7 @@ class Step:
 
         n1 = remainder(stress, first + earlier, slow[0])
         if self.fluid.series:
-            # the upper convected derivative is linear in the rate
+            # the upper-convected derivative is linear in the rate
             change = (taken - earlier) * slow[1] * mode.relaxation_time
             along = jnp.zeros_like(stress).at[0].set(2.0 * stress[3]).at[3].set(1.0 + stress[1])
             n1 = _if(on["series"], lambda: n1 + change * along, n1)

@@ -11,7 +11,7 @@ from tensor_library.law_terms import LawTerm
 
 
 class UpperConvectedMaxwell(AbstractConstitutiveLaw):
-    """Upper convected Maxwell law: h = 0   [Oldroyd 1950, Proc. R. Soc. A 200, 523]."""
+    """Upper-convected Maxwell law: h = 0   [Oldroyd 1950, Proc. R. Soc. A 200, 523]."""
 
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
@@ -171,7 +171,7 @@ class NonAffine(AbstractConstitutiveLaw):
 
 NAMED = {
     "ucm": NamedLaw(
-        "upper convected Maxwell",
+        "upper-convected Maxwell",
         UpperConvectedMaxwell,
         {},
         source="Oldroyd 1950, Proc. R. Soc. London A 200, 523",

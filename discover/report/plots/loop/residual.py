@@ -67,7 +67,7 @@ def residual_picture(result: LoopResult) -> look.Picture:
 
 def waterfall_picture(result: LoopResult) -> look.Picture:
     """Return the errors after each stage."""
-    labels = ["your model", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
+    labels = ["starting model", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     # from top to bottom and no wider than a phone shows with legible letters
     with look.figure(1, 1, width=5.2, height=1.1 + 0.42 * len(labels)) as (drawing, axes):

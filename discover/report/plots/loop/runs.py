@@ -76,7 +76,7 @@ def runs_picture(result: LoopResult) -> look.Picture:
         )
 
 
-AS_DECLARED, WITH_EFFECTS = "your model", "with effects"
+AS_DECLARED, WITH_EFFECTS = "starting model", "with effects"
 """The two models of a closed loop, as pictures name them."""
 
 FITTED_LAW = "", "law"
@@ -133,7 +133,7 @@ def draw_run(
     """
     colour = HELD_COLOUR if record.held_out else FIT_COLOUR
     if record.band is not None:
-        label = "95 % of measurements, all explanations"
+        label = "95 % prediction band"
         style = {"color": colour, "alpha": 0.18, "lw": 0, "label": label}
         look.shade_between(panel, along[shown], *record.band[:, shown], **style)
     style = {"ms": 2.5, "mfc": "none", "mew": 0.7, "color": look.TRUTH, "label": "measured"}
