@@ -234,7 +234,7 @@ def where(answer: Any) -> str:
     only = " only" * (len(quantities) == 1 and not implied)
     _, least = worst_run(answer) or ("", percent_of(answer.size) * (answer.adequate is False))
     use = f"Where {least} suffices, use" if least else "Use"
-    more = f" ({listed(implied)}: predicted, not measured)" if implied else ""
+    more = f" ({listed(implied)}: predicted, not tested)" if implied else ""
     return f"{use} for {listed(quantities)}{only}{more}, {place}."
 
 

@@ -136,7 +136,7 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
-            note = "no data: model spread"
+            note = f"{_without_data(result)}: model spread"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
         elif kind == "N2":
             found[kind] = _second_difference(result, differ)
@@ -145,6 +145,11 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
         else:
             found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
     return found
+
+
+def _without_data(result: Any) -> str:
+    """Return why nothing tests N1: it was not recorded, or is not used (`[data] observe`)."""
+    return "not used" if any(record.has_normal_stress for record in result.records) else "no data"
 
 
 def _second_difference(result: Any, differ: str) -> ExpectedError:

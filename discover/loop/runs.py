@@ -186,6 +186,7 @@ class RunRecord:
     band: Float[np.ndarray, "2 n"] | None = None
     control: Control = "rate"
     by_explanation: Float[np.ndarray, "explanations n"] | None = None
+    has_normal_stress: bool = False  # whether N1 was recorded as well
 
     @property
     def fastest(self) -> float:
@@ -266,6 +267,7 @@ def record_runs(
                 flow=run.flow,
                 quantity=run.quantity,
                 control=run.protocol.control,
+                has_normal_stress=run.first_normal_stress_difference is not None,
             )
         )
     return records

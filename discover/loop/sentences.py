@@ -152,6 +152,8 @@ def _of_predicted_n1(result: Any) -> str:
     """Return that N1 tests a law which predicts it; empty where it does not, or no one can."""
     if not normal_stress_settled(result) or not _is_in_reach(result, "N1"):
         return ""
+    if any(record.has_normal_stress for record in result.records):
+        return "Fit N1 too, which runs recorded: the law predicts it, and observe leaves it out."
     return f"Measure N1 at {_fastest(_sheared(result))}: the law predicts it, and no run tested it."
 
 

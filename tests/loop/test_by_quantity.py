@@ -137,6 +137,9 @@ def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
     close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09)}
     told = errors_by_quantity(result(FITTED, spread_of_laws=close))
     assert told["N1"].note == "no data: model spread"
+    recorded = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
+    found = result(recorded, spread_of_laws=close)
+    assert errors_by_quantity(found)["N1"].note == "not used: model spread"
     assert told["N2"].note == "rms −9 % of N1 by this law"
     assert told["N2"].missing == "no data"
     assert not told["N2"].is_known

@@ -62,7 +62,7 @@ KNOWN, OPEN = ExpectedError(0.03), ExpectedError(missing="not determined", note=
         (
             ("shear",),
             {"N1": replace(KNOWN, is_measured=False)},
-            "σ12 (N1: predicted, not measured)",
+            "σ12 (N1: predicted, not tested)",
         ),
         (("shear",), {"N1": ExpectedError(0.17, is_measured=False)}, "σ12 only"),
         (
