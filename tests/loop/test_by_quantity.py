@@ -225,6 +225,8 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
         what_to_measure_next(found)
         == "Measure N1 at 1 1/s: the law predicts it, and no run tested it."
     )
+    found.records = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
+    assert what_to_measure_next(found).startswith("Fit N1 too, which runs recorded")
     # not where it cannot be measured, was, or other effects make the same records
     check = "To confirm linear PTT, extend it."
     known["N1"] = replace(known["N1"], stress=0.5)
