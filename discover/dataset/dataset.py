@@ -15,7 +15,7 @@ from discover.dataset.run_table import run_line
 from discover.errors import InputError, Problems
 from discover.plain_numbers import short
 from discover.summary_view import NotebookView
-from discover.words import unknown_name
+from discover.words import counted, unknown_name
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,10 @@ class Dataset(NotebookView):
 
     def __repr__(self) -> str:
         sweep = "" if self.linear_sweep is None else ", linear sweep"
-        samples = sum(len(run) for run in self.runs)
+        runs, samples = len(self), sum(len(run) for run in self.runs)
         kind = type(self).__name__
-        return f"<{kind} {self.name!r}: {len(self)} runs, {samples} samples{sweep}>"
+        size = f"{counted(runs, 'run')}, {counted(samples, 'sample')}"
+        return f"<{kind} {self.name!r}: {size}{sweep}>"
 
     @overload
     def __getitem__(self, which: str | int | np.integer) -> Run: ...

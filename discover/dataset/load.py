@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,9 +9,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
 
 from discover.dataset.dataset import Dataset
+from discover.dataset.index_of_runs import (
+    rates_before,
+    read_clock_factors,
+    read_column,
+    read_index,
+)
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
@@ -20,16 +24,14 @@ from discover.dataset.records.repeats import in_sequence
 from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import (
-    Table,
     did_you_mean_file,
     is_inside,
     read_bytes,
-    read_table,
     table_in,
 )
 from discover.errors import InputError, Problems
 from discover.plain_numbers import as_number, short
-from discover.words import did_you_mean, unknown_name
+from discover.words import unknown_name
 
 DATA_VARIABLE = "DISCOVER_DATA"  # environment variable that names the folder of data folders
 SWEEP_FILE = "lve.csv"
@@ -113,7 +115,9 @@ def load_dataset(
         Whether the shear rate was measured and not commanded.
     rate_before
         Column of ``runs.csv`` with the shear rate of the steady flow before each run, in 1/s or
-        the unit at the end of its name; by default every run starts from rest.
+        the unit at the end of its name; an empty cell is a start from rest. By default a column
+        that begins with ``rate_before`` gives that of the runs whose ``start`` is ``steady``, and
+        the others start from rest.
     sequence
         Column that orders runs made one after another on one sample, such as start times; by
         default every run has a sample of its own.
@@ -125,6 +129,19 @@ def load_dataset(
     >>> import discover as dc
     >>> data = dc.load_dataset("melt")  # doctest: +SKIP
     """
+    root = resolve_folder(folder, base)
+    return _read_folder(
+        root, root.resolve().name, clock_factor, rate_is_measured, rate_before, sequence,
+        amplitude_sweep_rad_s,
+    )  # fmt: skip
+
+
+def _read_folder(
+    root: Path, name: str, clock_factor: str | None = None, rate_is_measured: bool = False,
+    rate_before: str | None = None, sequence: str | None = None,
+    amplitude_sweep_rad_s: float | None = None,
+) -> Dataset:  # fmt: skip
+    """Return what a folder that is there holds, under a name that messages call it by."""
     columns = {"clock_factor": clock_factor, "rate_before": rate_before, "sequence": sequence}
     for option, column in columns.items():
         if not isinstance(column, str | None):
@@ -134,8 +151,6 @@ def load_dataset(
     frequency = amplitude_sweep_rad_s
     if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
         raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
-    root = resolve_folder(folder, base)
-    name = root.resolve().name
     index = read_index(root)
     names = index.columns["file"]
     problems = Problems()
@@ -169,79 +184,6 @@ def load_dataset(
     if os.path.isfile(path) and is_inside(root, PROVENANCE_FILE):
         provenance = read_bytes(path, path.name).decode("utf-8", "replace")
     return Dataset(name, tuple(runs), sweep, provenance, {**unused, **aside}, tables)
-
-
-def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
-    """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
-
-    Without a name, a column that begins with ``rate_before`` holds the rates of those runs that are
-    declared to start from a steady flow. Raises InputError if it is missing or holds no numbers.
-    """
-    if column is not None:
-        rates = read_column(index, "rate_before", column)
-        return rates * units.heading_factor(column, units.SHEAR_RATE)
-    starts = index.columns.get("start", ())
-    steady = [row for row, cell in enumerate(starts) if cell.strip() == "steady"]
-    column = next((name for name in index.columns if name.startswith("rate_before")), None)
-    if column is None or not steady:
-        return None
-    rates = np.zeros(len(index))
-    rates[steady] = index.rows(steady).numbers(column)
-    return rates * units.heading_factor(column, units.SHEAR_RATE)
-
-
-def read_index(root: Path) -> Table:
-    """``runs.csv``, empty where there is none; InputError if the column ``file`` is wrong."""
-    if not os.path.lexists(root / INDEX_FILE):
-        return Table(INDEX_FILE, {"file": []}, [])
-    index = read_table(root / INDEX_FILE)
-    if "file" not in index.columns:
-        raise InputError(
-            f"{INDEX_FILE} has no column 'file'; its columns are {index.listed}. Add "
-            "it, with the file name of each run."
-        )
-    seen: set[str] = set()
-    problems = Problems()
-    for line, name in zip(index.lines, index.columns["file"], strict=True):
-        where = f"Line {line} of {INDEX_FILE}"
-        if not name:
-            problems.add(f"{where} names no file. Name one, or remove the line.")
-        elif not name.isprintable():
-            problems.add(f"{where} names {name!r}; no file is named so. Correct it.")
-        elif name in seen:
-            problems.add(f"{INDEX_FILE} names {name} twice, again on line {line}; keep one.")
-        elif not is_inside(root, name):
-            problems.add(
-                f"{where} names {name!r}, which lies outside the folder or is a link to there. Put "
-                "the file itself in the folder and name it without a path."
-            )
-        seen.add(name)
-    problems.require_none(INDEX_FILE)
-    return index
-
-
-def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
-    """Return the clock factor of every run; ones if no column is named, InputError if wrong."""
-    if column is None:
-        return np.ones(len(index))
-    factors = read_column(index, "clock_factor", column)
-    if np.any(factors <= 0):
-        row = int(np.argmax(factors <= 0))
-        raise InputError(
-            f"{column} in {INDEX_FILE} must be positive; line {index.lines[row]} holds "
-            f"{factors[row]:g}. Instrument time is time / {column}; correct that line."
-        )
-    return factors
-
-
-def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs"]:
-    """Return the numbers in a column of ``runs.csv`` that a key names; InputError if none are."""
-    if column not in index.columns:
-        raise InputError(
-            f"{key} names the column {column!r}, but {INDEX_FILE} has only {index.listed}."
-            f"{did_you_mean(column, index.columns)} Correct the name, or leave {key} out."
-        )
-    return index.numbers(column)
 
 
 def find_sweep(root: Path) -> LinearSweep | None:
@@ -288,7 +230,7 @@ def from_dataframe(
     >>> import pandas as pd
     >>> samples = pd.DataFrame({"time_s": [0.0, 0.5, 1.0], "shear_rate_1_s": 0.5})
     >>> dc.from_dataframe(samples.assign(stress_Pa=[0.0, 19.7, 31.6], run="slow"))
-    <Dataset 'data in memory': 1 runs, 3 samples>
+    <Dataset 'data in memory': 1 run, 3 samples>
     """
     if not (tables is None or isinstance(tables, Mapping)):
         raise InputError(f"tables must be a mapping of names to tables; got {short(tables)}.")
@@ -303,9 +245,9 @@ def from_dataframe(
                 f"The columns of {label} must have text for names, on one level; got "
                 f"{short(odd[0])}. Rename them, or flatten them with reset_index()."
             )
-    known = list(signature(load_dataset).parameters)
+    known = [*signature(_read_folder).parameters][2:]
     if no_option := [one for one in options if one not in known]:
-        raise InputError(unknown_name("option", no_option[0], known[1:], "from_dataframe"))
+        raise InputError(unknown_name("option", no_option[0], known, "from_dataframe"))
     if unknown := [kind for kind in tables or {} if kind not in _KINDS]:
         raise InputError(unknown_name("table", unknown[0], _KINDS))
     by_run = _by_run(samples, name)
@@ -319,7 +261,7 @@ def from_dataframe(
             table.to_csv(Path(folder) / f"{kind}.csv", index=False)
         if not any(Path(folder).iterdir()):
             raise InputError("There is no sample and no table; give one with samples at least.")
-        return replace(load_dataset(folder, **options), name=name)
+        return _read_folder(Path(folder), name, **options)
 
 
 def _can_name_a_run(name: object) -> bool:

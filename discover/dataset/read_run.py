@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.records.thinning import MOST_SAMPLES, thin
-from discover.dataset.run import Run
+from discover.dataset.run import TEMPERATURE, Run
 from discover.dataset.run_table import oscillation, wave_of
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, is_number, read_table
@@ -18,7 +18,7 @@ from discover.protocols.control import imposed_stress
 from discover.protocols.history import after_alternation, after_step_strain
 from discover.protocols.kinematics import KINDS
 from discover.protocols.protocol import FlowProtocol, in_flow, start_up
-from discover.words import did_you_mean
+from discover.words import counted, did_you_mean
 
 INDEX_FILE = "runs.csv"
 
@@ -79,7 +79,12 @@ def declared_test(index: Table, row: int, rate_before: float | None) -> Declared
         both = "an oscillation and a steady flow before t = 0"
     if both:
         raise InputError(f"{where} declares both {both}. Leave one of them out.")
-    _number(index, row, "temperature_C")
+    for column in TEMPERATURE:
+        if _number(index, row, column) < units.ABSOLUTE_ZERO:
+            raise InputError(
+                f"{where}: {column} is {_cell(index, row, column)}, below absolute zero "
+                f"({units.ABSOLUTE_ZERO} °C). Write a temperature in °C, or leave the cell empty."
+            )
     if start == "steady" and rate_before is None:
         raise SetAside(
             "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
@@ -132,7 +137,8 @@ def read_run(
         column: float(cell) if is_number(cell) else cell for column, cell in cells.items()
     }
     test = declared_test(index, row, rate_before)
-    time, stress, (rate, strain, *normal) = _columns(table, test)
+    where = f"Line {index.lines[row]} of {INDEX_FILE}"
+    time, stress, (rate, strain, *normal) = _columns(table, test, where)
     derived = False
     if rate is None:
         rate, derived = _rate(table, test, time, strain)
@@ -146,7 +152,7 @@ def read_run(
         strain, *normal = (v if v is None else v[keep] for v in (strain, *normal))
     # of a test at a given stress the rate is what the fluid answered
     measured = rate_is_measured or derived or test.control == "stress"
-    if test.control == "stress" and strain is not None:
+    if test.control == "stress":
         protocol, source = _imposed(name, time, stress), "what the fluid answered"
     elif derived:
         protocol = sampled_rate(time, rate)
@@ -165,11 +171,16 @@ def read_run(
         strain=strain, clock_factor=clock_factor, rate_is_measured=measured,
         rate_before=test.rate_before, metadata=metadata,
     )  # fmt: skip
-    return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
+    return _begun(run, test, where)
 
 
-def _columns(table: Table, test: DeclaredTest) -> tuple[Values, Values, list[Values | None]]:
-    """Time, stress, and rate, strain, N1 and N2 or None; InputError with all that is wrong."""
+def _columns(
+    table: Table, test: DeclaredTest, where: str
+) -> tuple[Values, Values, list[Values | None]]:
+    """Time, stress, and rate, strain, N1 and N2 or None; InputError with all that is wrong.
+
+    `where`: the line of ``runs.csv`` that declares the test.
+    """
     problems, found = Problems(), {}
     time = stress = np.empty(0)
     imposed, *answers = _OF_SHEAR if test.flow == "shear" else _OF_EXTENSION
@@ -182,6 +193,15 @@ def _columns(table: Table, test: DeclaredTest) -> tuple[Values, Values, list[Val
     with problems.collected():
         if all(found.get(answer, time) is None for answer in answers):
             _refuse_another_flow(table, test)  # or a stress of that flow is taken for a slip
+        strain = answers[-1]
+        # what is not in `found` is there and wrong, which is said already
+        if test.control == "stress" and strain in found and found[strain] is None:
+            problems.add(
+                f"{where} declares control = stress, but {table.name} has no column "
+                f"{strain.column}, which is what is fitted of a test at a given stress; its "
+                f"columns are {table.listed}. Add the strain that was recorded, or leave the cell "
+                "control empty if the rate was imposed."
+            )
         stress = table.required(imposed)
     problems.require_none(table.name)
     return time, stress, list(found.values())
@@ -227,8 +247,8 @@ def differentiate(time: Values, values: Values) -> Values:
     n = len(time)
     if n < _DEGREE + 2:
         raise InputError(
-            f"A rate cannot be derived from {n} samples of strain; give at least 5, or a "
-            "column shear_rate_1_s."
+            f"A rate cannot be derived from {counted(n, 'sample')} of strain; give at least 5, or "
+            "a column shear_rate_1_s."
         )
     window = min(WINDOW, n)
     slopes = []

@@ -19,6 +19,7 @@ from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuan
 from discover.protocols.protocol import FlowProtocol, recording
 from discover.statistics.noise.noise_model import rms
 from discover.summary_view import NotebookView
+from discover.words import counted
 
 # Relative error of one run above which two do not differ by their loading: fillings and trimmings
 # of one sample differ by some per cent, and what differs by more, as a run told in minutes does,
@@ -163,7 +164,7 @@ class Run(NotebookView):
     def __repr__(self) -> str:
         kinds = [name for name, values in self._recorded().items() if values is not None]
         span = f"{self.time[0]:.4g} to {self.time[-1]:.4g} s"
-        return f"<Run {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
+        return f"<Run {self.name!r}: {counted(len(self), 'sample')}, {span}, {', '.join(kinds)}>"
 
     def _shown(self) -> Iterator[Any]:
         yield repr(self).strip("<>")

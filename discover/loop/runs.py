@@ -20,6 +20,7 @@ from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
+from discover.words import counted
 
 FEWEST_SAMPLES = 5
 """Samples beyond the constants to be fitted, below which any law fits."""
@@ -108,9 +109,9 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
         keep = (strain >= low) & (strain <= high)
         if np.count_nonzero(keep) < 3:
             raise InputError(
-                f"The run {run.name!r} has {np.count_nonzero(keep)} samples at strains from "
-                f"{low:g} to {high:g}; at least 3 are needed. Widen [loop] strain or leave the run "
-                "out."
+                f"The run {run.name!r} has {counted(int(np.sum(keep)), 'sample')} at strains "
+                f"from {low:g} to {high:g}; at least 3 are needed. Widen [loop] strain or leave "
+                "the run out."
             )
         cut.append(run.window(keep))
     return cut

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_
 from discover.answer import TOLERANCE
 from discover.dataset.linear_viscoelasticity import MOST_MODES
 from discover.dataset.run import LARGEST
+from discover.dataset.tables.units import ABSOLUTE_ZERO
 from discover.effects.registry import known_effects
 from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS, make_law, starting_value
@@ -159,7 +160,7 @@ class Data(Section):
     """Data computed from a known law, in place of a folder."""
     material: Annotated[str, Field(max_length=80)] = ""
     """Name of the material, for titles."""
-    temperature_C: Annotated[float, Field(ge=-273.15)] | None = None
+    temperature_C: Annotated[float, Field(ge=ABSOLUTE_ZERO)] | None = None
     """Temperature of the moduli and times in °C: of shifted data the reference. By default that of
     `runs.csv`."""
     fit: tuple[str, ...] | None = None

@@ -155,7 +155,7 @@ BY_HAND = {
     "capitals": ("Time_s,shear_rate_1_s,stress_Pa\n0,1,1\n", "case-sensitive"),
     "brackets": ("time [s],shear_rate_1_s,stress_Pa\n0,1,1\n", "Rename time [s] to time_s"),
     "quote left open": (HEADER + '0,1,"1\n', "Fix the quotes"),
-    "one sample of strain": ("time_s,strain,stress_Pa\n0,1,1\n", "1 samples of strain"),
+    "one sample of strain": ("time_s,strain,stress_Pa\n0,1,1\n", "1 sample of strain"),
     "empty": ("", "a.csv is empty"),
     "no stress": ("time_s,shear_rate_1_s\n0,1\n", "no column stress_Pa"),
     "no rate": ("time_s,stress_Pa\n0,1\n", "no column shear_rate_1_s"),

@@ -66,6 +66,39 @@ def test_a_steady_start_takes_its_rate_from_the_column_of_that_name(tmp_path):
     assert [f.subject for f in check_folder(made) if f.severity == "error"] == ["start"]
 
 
+def test_an_empty_rate_before_is_a_start_from_rest_whether_or_not_a_key_names_it(tmp_path):
+    made = folder(tmp_path / "melt", "file,start,rate_before_1_s", "a.csv,steady,5", "b.csv,,")
+    for key in (None, "rate_before_1_s"):
+        assert [run.rate_before for run in load_dataset(made, rate_before=key)] == [5.0, 0.0]
+    (made / "runs.csv").write_text("file,start,rate_before_1_s\na.csv,steady,\nb.csv,,5\n")
+    for key in (None, "rate_before_1_s"):
+        with pytest.raises(InputError, match="line 2 holds nothing"):
+            load_dataset(made, rate_before=key)
+
+
+def test_what_is_said_of_a_rate_before_is_what_is_done_with_it(tmp_path):
+    lines = ("a.csv,steady,5", "b.csv,,", "c.csv,,3")
+    made = folder(tmp_path / "melt", "file,start,rate_before_1_s", *lines)
+    used, beside = (f.text for f in check_folder(made) if f.subject == "start")
+    assert "the rate of the steady flow before a.csv (start is steady)" in used
+    assert "a rate in rate_before_1_s for c.csv, taken as starting from rest" in beside
+    assert [run.rate_before for run in load_dataset(made)] == [5.0, 0.0, 0.0]
+    named = load_dataset(made, rate_before="rate_before_1_s")
+    assert [run.rate_before for run in named] == [5.0, 0.0, 3.0]
+    (made / "runs.csv").write_text("file,rate_before_1_s\na.csv,5\nb.csv,\n")
+    (unused,) = (f.text for f in check_folder(made) if f.subject == "start")
+    assert "without it the column is not used" in unused
+
+
+def test_a_rate_before_that_is_no_number_is_an_error_that_names_the_cell(tmp_path):
+    made = folder(tmp_path / "melt", "file,rate_before_1_s,temperature_C", "a.csv,,", "b.csv,x,25")
+    (said,) = (f for f in check_folder(made) if f.subject == "start")
+    assert said.severity == "error"
+    assert "rate_before_1_s in runs.csv must hold finite numbers; line 3 holds x" in said.text
+    with pytest.raises(InputError, match="line 3 holds x"):
+        load_dataset(made)
+
+
 def test_a_step_of_strain_is_part_of_what_was_imposed(tmp_path):
     header = "file,step_strain,step_time_s"
     made = folder(tmp_path / "melt", header, "a.csv,2,", "b.csv,2,0.5")
@@ -116,6 +149,28 @@ def test_a_rate_under_imposed_stress_counts_as_measured(tmp_path):
     made = folder(tmp_path / "gel", "file,control", "a.csv,stress", "b.csv,rate")
     data = load_dataset(made)
     assert [run.rate_is_measured for run in data] == [True, False]
+
+
+def test_imposed_stress_without_the_strain_that_answered_is_refused_once(tmp_path):
+    made = folder(tmp_path / "gel", "file,control,flow", "a.csv,stress,", "b.csv,stress,uniaxial")
+    rows = ["time_s,shear_rate_1_s,stress_Pa", *(f"{t},0.5,{t}" for t in TIME)]
+    (made / "a.csv").write_text("\n".join(rows) + "\n")
+    said = [str(f) for f in check_folder(made).of("error")]
+    wanted = zip(said, (2, 3), ("a.csv", "b.csv"), ("strain", "hencky_strain"), strict=True)
+    for text, line, file, column in wanted:
+        assert f"Line {line} of runs.csv declares control = stress, but {file} has" in text
+        assert f"no column {column}, " in text
+        assert "leave the cell control empty if the rate was imposed" in text
+    with pytest.raises(InputError, match="2 problems"):
+        load_dataset(made)
+
+
+def test_no_temperature_is_below_absolute_zero(tmp_path):
+    lines = ("a.csv,-300", "b.csv,-273.15", "c.csv,hot")
+    made = folder(tmp_path / "melt", "file,temperature_C", *lines)
+    cold, hot = (str(f) for f in check_folder(made).of("error"))
+    assert "Line 2 of runs.csv: temperature_C is -300, below absolute zero (-273.15 °C)" in cold
+    assert "'hot'" in hot
 
 
 @pytest.mark.parametrize(

@@ -253,6 +253,20 @@ def test_other_names_are_kept(name):
     assert list(dc.from_dataframe(samples(name)).names) == [name]
 
 
+def test_errors_call_data_in_memory_by_its_name_and_not_by_a_folder():
+    wrong = pd.concat([samples(name, stress_Pa="x") for name in ("slow", "fast")])
+    with pytest.raises(dc.InputError, match=r"^data in memory: 2 problems\."):
+        dc.from_dataframe(wrong)
+    with pytest.raises(dc.InputError, match=r"^melt: 2 problems\."):
+        dc.from_dataframe(wrong, name="melt")
+
+
+def test_one_sample_and_one_run_are_counted_in_the_singular():
+    data = dc.from_dataframe(samples("slow").iloc[:1])
+    assert repr(data) == "<Dataset 'data in memory': 1 run, 1 sample>"
+    assert "1 sample," in repr(data[0])
+
+
 @pytest.mark.parametrize(
     "table",
     [

@@ -8,19 +8,22 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
+from jaxtyping import Bool
 
-from discover.dataset import load, material_functions
+from discover.dataset import index_of_runs, load, material_functions
 from discover.dataset.checking import linear_theory, start_up
 from discover.dataset.checking import runs as run_checks
 from discover.dataset.checking.runs import Finding, Findings, Severity, found
+from discover.dataset.index_of_runs import read_index
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
-from discover.dataset.load import SWEEP_FILE, read_index
+from discover.dataset.load import SWEEP_FILE
 from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table, shown
 from discover.errors import InputError, problems_in
+from discover.words import counted
 
 _RUN_QUANTITIES = (
     units.TIME, units.SHEAR_RATE, units.SHEAR_STRESS, *units.NORMAL_STRESS_DIFFERENCES,
@@ -51,9 +54,10 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
         root = load.resolve_folder(folder, None)
         place = "runs", INDEX_FILE
         index = read_index(root)
-        findings += [*_clock(index, clock_factor), *_before(index)]
+        findings += _clock(index, clock_factor)
         place = "start", INDEX_FILE
-        before = load.rates_before(index, None)
+        before = index_of_runs.rates_before(index, None)
+        findings += _before(index)
     except InputError as wrong:
         return Findings([*findings, *_errors(*place, wrong)])
     names, read = index.columns["file"], []
@@ -125,7 +129,9 @@ def _tables(
     for table in tables.values():
         kind = str(run_line(table)["flow"])
         kind = f"{'an' if kind[0] in 'ao' else 'a'} {kind}"
-        findings.append(found("table", table.name, kind=kind, samples=len(table)))
+        findings.append(
+            found("table", table.name, kind=kind, samples=counted(len(table), "sample"))
+        )
     findings += [found("table_set_aside", name, why=reason) for name, reason in aside.items()]
     if "amplitude_sweep" in tables:
         findings += [] if sweep is None else [found("sweep", SWEEP_FILE, samples=len(sweep))]
@@ -142,7 +148,7 @@ def _clock(index: Table, column: str | None) -> Iterator[Finding]:
     for name in _shift_columns(index) if column is None else ():
         yield found("clock_column", INDEX_FILE, column=name)
     try:
-        factors = load.read_clock_factors(index, column)
+        factors = index_of_runs.read_clock_factors(index, column)
     except InputError as wrong:
         yield Finding("error", "clock", INDEX_FILE, str(wrong))
         return
@@ -156,11 +162,26 @@ def _before(index: Table) -> Iterator[Finding]:
             continue
         try:
             factor = units.heading_factor(name, units.SHEAR_RATE)
+            rates = index_of_runs.rates_in(index, name)
         except InputError as wrong:
             yield found("unknown_rate_before", INDEX_FILE, why=wrong)
             continue
         unit = "1/s" if factor == 1.0 else f"1/s after multiplying by {factor:.6g}"
-        yield found("rate_before", INDEX_FILE, column=name, unit=unit)
+        words = {"column": name, "unit": unit}
+        steady = index_of_runs.starts_steady(index)
+        if name != index_of_runs.column_of_rates_before(index) or not np.any(steady):
+            yield found("rate_before", INDEX_FILE, **words)
+            continue
+        yield found("rate_before_used", INDEX_FILE, runs=_runs(index, steady), **words)
+        beside = (rates != 0.0) & ~steady
+        if np.any(beside):
+            yield found("rate_before_beside", INDEX_FILE, runs=_runs(index, beside), column=name)
+
+
+def _runs(index: Table, which: Bool[np.ndarray, " runs"]) -> str:
+    """Return some runs in words: the name of one, or how many."""
+    names = [name for name, one in zip(index.columns["file"], which, strict=True) if one]
+    return names[0] if len(names) == 1 else counted(len(names), "run")
 
 
 def _of_columns(runs: Sequence[Table], beside: Sequence[Table]) -> Iterator[Finding]:

@@ -100,7 +100,7 @@ def doubts_of_run(run: Run) -> Iterator[Finding]:
     if source.startswith("derived"):
         yield found("derived", name, how=source)
     if len(run) < FEWEST_SAMPLES:
-        yield found("few_samples", name, samples=len(run), fewest=FEWEST_SAMPLES)
+        yield found("few_samples", name, samples=counted(len(run), "sample"), fewest=FEWEST_SAMPLES)
     if run.protocol.control != "rate":
         strain = run.recorded
         if np.ptp(strain) <= _EQUAL * np.max(np.abs(strain)):

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.tables.table import read_toml, toml_string
+from discover.dataset.tables.units import ABSOLUTE_ZERO
 from discover.validation import Section, one_of, validated
 
 MAPPING_FILE = "import.toml"
@@ -22,7 +23,7 @@ TestName = Literal[
 
 EVERY_BLOCK = "*"
 
-Celsius = Annotated[float, Field(ge=-273.15, le=2000)]  # a temperature that can be
+Celsius = Annotated[float, Field(ge=ABSOLUTE_ZERO, le=2000)]  # a temperature that can be
 
 
 class Geometry(Section):

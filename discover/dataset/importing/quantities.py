@@ -13,7 +13,13 @@ from discover.dataset.importing.text_rows import is_clock
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
 from discover.dataset.tables import units
 from discover.dataset.tables.table import shown
-from discover.dataset.tables.units import Quantity, read_heading, read_unit, tidy_unit
+from discover.dataset.tables.units import (
+    ABSOLUTE_ZERO,
+    Quantity,
+    read_heading,
+    read_unit,
+    tidy_unit,
+)
 from discover.errors import InputError
 from discover.words import listed
 
@@ -136,7 +142,7 @@ def to_celsius(value: float, unit: str) -> float | None:
     if scale in ("C", "CELSIUS"):
         return value
     if scale in ("K", "KELVIN"):
-        return value - 273.15
+        return value + ABSOLUTE_ZERO
     return (value - 32.0) / 1.8 if scale in ("F", "FAHRENHEIT") else None
 
 

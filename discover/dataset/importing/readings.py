@@ -15,6 +15,7 @@ from discover.dataset.importing.quantities import QUANTITIES, UnsaidUnit, name_r
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import Constant, is_clock, seconds, temperature_in
 from discover.dataset.tables.table import shown
+from discover.dataset.tables.units import ABSOLUTE_ZERO
 from discover.errors import InputError
 
 # what the instrument itself measures, from which each follows by the geometry of the tool
@@ -129,8 +130,8 @@ class Readings:
 
     def _no_temperature(self, said: str) -> None:
         self.notes["temperature"] = (
-            f"{said} is not a temperature (-273.15 to 2000 °C) and not used; give it, as in "
-            f"--temperature {shown(self.name)}=25"
+            f"{said} is not a temperature ({ABSOLUTE_ZERO} to 2000 °C) and not used; give it, as "
+            f"in --temperature {shown(self.name)}=25"
         )
 
     def _column(self, key: str) -> Values:
@@ -273,4 +274,4 @@ class Readings:
 
 def _is_temperature(degrees):
     """Return whether numbers in °C can be temperatures, as a `Mapping` takes them."""
-    return (degrees >= -273.15) & (degrees <= 2000.0)
+    return (degrees >= ABSOLUTE_ZERO) & (degrees <= 2000.0)

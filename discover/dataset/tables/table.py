@@ -72,7 +72,7 @@ class Table:
             row = int(rows[0])
             raise InputError(
                 f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
-                f"{shown(text[row])}. {_remedy(text[row], row)}{self.like_it(rows)}"
+                f"{shown(text[row])}. {self._remedy(text[row], row)}{self.like_it(rows)}"
             )
         values = np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values * factor)
         row = int(np.argmax(np.abs(values)))
@@ -84,6 +84,20 @@ class Table:
                 "or the unit in the heading."
             )
         return values
+
+    def _remedy(self, cell: str, row: int) -> str:
+        if _DECIMAL_COMMA.fullmatch(cell):
+            return f"Write decimal points, not commas, or use {_IMPORT}."
+        # a row of units has no number in any column
+        words = not any(is_number(cells[row]) for cells in self.columns.values())
+        if row == 0 and cell and words and not any(c.isdigit() for c in cell.replace("1/", "")):
+            return (
+                "That looks like a row of units: put them into the header, as in time_s, and "
+                f"remove the row, or use {_IMPORT}."
+            )
+        if is_number(cell):
+            return "That is beyond what a computer holds as a number; correct that line."
+        return "Correct that line or remove it."
 
     def like_it(self, rows: Int[np.ndarray, " faulty"]) -> str:
         """Return which lines of the file have the fault of the first of some rows too."""
@@ -308,19 +322,6 @@ def _like_it(lines: Sequence[int]) -> str:
     if len(others) > _MOST_LINES:
         others = [*others[:_MOST_LINES], f"{len(others) - _MOST_LINES} more"]
     return f" (Line{'s' * (len(others) > 1)} {listed(others)} too.)" if others else ""
-
-
-def _remedy(cell: str, row: int) -> str:
-    if _DECIMAL_COMMA.fullmatch(cell):
-        return f"Write decimal points, not commas, or use {_IMPORT}."
-    if row == 0 and cell and not any(c.isdigit() for c in cell.replace("1/", "")):
-        return (
-            "That looks like a row of units: put them into the header, as in time_s, and remove "
-            f"the row, or use {_IMPORT}."
-        )
-    if is_number(cell):
-        return "That is beyond what a computer holds as a number; correct that line."
-    return "Correct that line or remove it."
 
 
 def _rename(quantity: Quantity, columns: Mapping[str, Sequence[str]]) -> str:

@@ -17,6 +17,9 @@ from discover.errors import InputError
 
 _LONGEST = 40  # characters
 
+ABSOLUTE_ZERO = -273.15
+"""In °C: no temperature is lower."""
+
 
 @cache
 def _spellings() -> dict[str, str]:
