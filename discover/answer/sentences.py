@@ -232,7 +232,8 @@ def where(answer: Any) -> str:
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     only = " only" * (len(quantities) == 1 and not implied)
-    _, least = worst_run(answer) or ("", percent_of(answer.size) * (answer.adequate is False))
+    mean = "" if answer.adequate is not False else percent_of(answer.size)
+    _, least = worst_run(answer) or ("", mean)
     use = f"Where {least} suffices, use" if least else "Use"
     more = f" ({listed(implied)}: predicted, not tested)" if implied else ""
     return f"{use} for {listed(quantities)}{only}{more}, {place}."
