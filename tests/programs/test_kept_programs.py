@@ -217,7 +217,8 @@ def _named(function):
 
 
 def test_models_that_share_every_shape_have_programs_of_their_own(folder):
-    program_of.cache_clear()  # what a test before had made would write nothing here
+    forget_programs()  # what a test before had made would write nothing here
+    program_of.cache_clear()
     # jax.vmap of a method bears the method's name, whatever its object holds
     declared = DeclaredModel.maxwell(100.0, 1.0)
     times = np.linspace(0.1, 2.0, 30)
