@@ -13,7 +13,7 @@ from discover.answer.sentences import MEASURED_AT, at_most
 from discover.loop.fitted_range import by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
-from discover.words import listed, percent_of
+from discover.words import listed, percent_of, significant
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
@@ -161,7 +161,7 @@ def _second_difference(result: Any, differ: str) -> ExpectedError:
     ratio = None if spread is None else spread.over_n1
     if ratio is None:
         return ExpectedError()
-    share = "0" if abs(ratio) < _NOTHING else f"rms {percent_of(ratio)} of N1".replace("-", "−")
+    share = "0" if abs(ratio) < _NOTHING else f"N2/N1 ≈ {significant(ratio, 2)}"
     return ExpectedError(note=f"{share} by this law")
 
 

@@ -99,7 +99,7 @@ def _of_sweep(result: Any) -> str:
     fitted = [one for name, one in result.declared_parameters.items() if name in OF_SWEEP]
     if not any(differ(one.ci95, result.tolerance) for one in fitted if not one.is_open):
         return ""
-    return "Repeat the frequency sweep on the same loaded sample as these runs."
+    return "Repeat the frequency sweep on the same loaded sample: these runs have other moduli."
 
 
 def _fastest(records: Sequence[RunRecord]) -> str:

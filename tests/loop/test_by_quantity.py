@@ -140,7 +140,7 @@ def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
     recorded = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
     found = result(recorded, spread_of_laws=close)
     assert errors_by_quantity(found)["N1"].note == "not used: model spread"
-    assert told["N2"].note == "rms −9 % of N1 by this law"
+    assert told["N2"].note == "N2/N1 ≈ −0.09 by this law"
     assert told["N2"].missing == "no data"
     assert not told["N2"].is_known
     affine = {**close, "N2": Spread(0.0, 0.0, 1e-9)}  # but for the integrator
@@ -187,7 +187,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
 
 def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
     factor = StageParameter(0.52, (0.04, 0.79), "1")
-    again = "Repeat the frequency sweep on the same loaded sample as these runs."
+    again = "Repeat the frequency sweep on the same loaded sample: these runs have other moduli."
     for name in ("modulus_factor", "relaxation_time_factor"):
         assert what_to_measure_next(close(declared_parameters={name: factor})) == again
     # the first is next to one, within the tolerance of 10 %, and the last is no value
