@@ -66,8 +66,8 @@ def compare(
     first
         Fitted estimators, one of each learner at most, or a data set.
     second
-        The data set that tests estimators; for a data set the known `Fluid`, by default upper
-        convected Maxwell with G = 1 Pa and λ = 1 s.
+        The data set that tests estimators; for a data set the known `Fluid`, by default that of its
+        linear sweep, and without one upper-convected Maxwell with G = 1 Pa and λ = 1 s.
     train
         What estimators from a file were fitted to; the file holds no data.
     held_out

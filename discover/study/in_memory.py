@@ -70,11 +70,14 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
 
 
 def declared_fluid(base: Any, data: Dataset) -> StudyModel:
-    """Return a `Fluid` as the declared model of a study; None is Maxwell with G = 1 Pa, λ = 1 s.
+    """Return a `Fluid` as the declared model of a study.
 
-    Where the modes are those of the data's linear sweep, the error of the sweep is known.
+    None is that of the data's linear sweep, whose error is then known, and without a sweep Maxwell
+    with G = 1 Pa and λ = 1 s.
     """
-    if base is None:
+    if base is None and data.linear_sweep is not None:
+        base = Fluid.from_sweep(data.linear_sweep)
+    elif base is None:
         from discover.laws.textbook.classical import UpperConvectedMaxwell
 
         base = Fluid.dimensionless(UpperConvectedMaxwell())
