@@ -66,9 +66,9 @@ def test_a_run_from_a_steady_flow_is_exact_without_the_idle_pieces(law, before, 
     # what the grid's own steps after the jump leave, most where a law thins fast
     most = 3e-5 if law == "ptt_linear" else 5e-6
     np.testing.assert_allclose(found, exact, atol=most * np.max(np.abs(exact)))
-    # at a rate of 5 steady after a sixth of the flow before; at 50, held for a tenth of the time,
-    # after two thirds
-    most_taken = 0.75 if before > BEFORE else 1.0 / 3.0
+    # at a rate of 5 steady after a sixth of the flow before, Johnson-Segalman, which rings, after
+    # half; at 50, held for a tenth of the time, after two thirds
+    most_taken = 0.75 if before > BEFORE else 0.6
     assert taken[0] < most_taken * int(np.sum(batch.parts[0].pieces))
 
 
