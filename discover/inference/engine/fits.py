@@ -24,9 +24,6 @@ _SHIFTED_ANEW = 0.03
 """Of the records, how far predictions move before what errors of the moduli do is taken anew: these
 errors are some per cent of the records themselves."""
 
-_KNOWN = 32
-"""Predictions of which what errors of the moduli do to them is kept, for fits that come near."""
-
 _TRIALS = ((0.1, 0.0), (0.1, 10.0))
 """What is tried side by side: multiples of the last damping, and the least size over the usual one
 by which runs may differ, for from where they do not, it takes a leap to where they do."""
@@ -61,7 +58,6 @@ class Fitter:
         self._priors: dict[tuple[str, ...], tuple[Priors, np.ndarray]] = {}
         self._moduli = self._moved_moduli()
         self._shifts = np.zeros((len(rows), len(self._moduli)))
-        self._known: list[tuple[np.ndarray, np.ndarray]] = []
         self.errors = LinearErrors(problem, rows, self._shifts.shape[1])
 
     def noise_of(self, fit: Fit) -> NoiseModel:
@@ -94,25 +90,13 @@ class Fitter:
         with _running_away():
             return np.nan_to_num((moved - predicted).T / _MOVED)
 
-    def _has_shifts(self, fit: Fit) -> bool:
-        """Return whether what errors of the moduli do is known of predictions near those of a fit.
-
-        Its own are kept while they are near, and else the nearest of any fit are taken.
-        """
-        if not len(self._moduli):
-            return True
-        own = [] if fit.shifts is None else [(fit.shifted, fit.shifts)]
-        for some in (own, self._known):
-            if not some:
-                continue
-            with _running_away():
-                moved = (np.array([near for near, _ in some]) - fit.predicted) / self.rows.size
-                off = np.nan_to_num(np.sqrt(np.mean(moved**2, axis=1)), nan=np.inf)
-            nearest = int(np.argmin(off))
-            if off[nearest] < _SHIFTED_ANEW:
-                fit.shifted, fit.shifts = some[nearest]
-                return True
-        return False
+    def _is_shifted_anew(self, fit: Fit) -> bool:
+        """Return whether what errors of the moduli do is to be taken at other constants."""
+        if fit.shifts is None:
+            return len(self._moduli) > 0
+        moved = (fit.predicted - fit.shifted) / self.rows.size
+        with _running_away():
+            return not np.sqrt(np.mean(moved**2)) < _SHIFTED_ANEW
 
     # predictions ------------------------------------------------------------------------------
 
@@ -124,17 +108,11 @@ class Fitter:
         """Return the records of the model alone; not finite where the law runs away."""
         if not len(thetas):
             return np.zeros((0, len(self.rows)))
-        if moduli is None:
-            moduli = np.tile(self.problem.moduli, (len(thetas), 1))
-        # fits without each run in turn begin with the same vectors
-        first: dict[bytes, int] = {}
-        asked = np.hstack([thetas, moduli])
-        of = [first.setdefault(row.tobytes(), len(first)) for row in asked]
-        _, some = np.unique(of, return_index=True)
-        model, batch = self.problem.model, self.rows.batch
         with np.errstate(all="ignore"):
-            found = self.rows.flat(model.predictions(np.array(thetas)[some], batch, moduli[some]))
-        return found[of]
+            if moduli is None:
+                moduli = np.tile(self.problem.moduli, (len(thetas), 1))
+            model, batch = self.problem.model, self.rows.batch
+            return self.rows.flat(model.predictions(np.array(thetas), batch, moduli))
 
     def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
         """Return the priors of all that is free where some effects are there, by position."""
@@ -289,8 +267,7 @@ class Fitter:
         it is in proportion to the stress of each mode.
         """
         moved = [self._moved(fit) for fit in fits]
-        before = [fit.shifts for fit in fits]
-        anew = [not self._has_shifts(fit) for fit in fits]
+        anew = [self._is_shifted_anew(fit) for fit in fits]
         declared, thetas, moduli = self.problem.moduli, [], []
         for fit, some, is_anew in zip(fits, moved, anew, strict=True):
             shifted = self._moduli if is_anew else self._moduli[:0]
@@ -305,18 +282,17 @@ class Fitter:
                 end = place + len(self._moduli)
                 fit.shifts, place = self._shifts_of(found[place:end], fit.predicted), end
                 fit.shifted = fit.predicted
-                self._known = [*self._known, (fit.shifted, fit.shifts)][-_KNOWN:]
             with _running_away():
                 slopes = (own - fit.predicted).T / self._steps(fit)
             fit.slopes = np.where(np.all(np.isfinite(slopes), axis=0), slopes, 0.0)
             self._set_jacobian(fit)
-        changed = [
+        usable = [
             fit
-            for fit, shifts in zip(fits, before, strict=True)
-            if fit.shifts is not shifts and np.isfinite(fit.log_posterior)
+            for fit, is_anew in zip(fits, anew, strict=True)
+            if is_anew and np.isfinite(fit.log_posterior)
         ]
-        if changed:
-            self._set(changed, np.array([fit.predicted for fit in changed]))
+        if usable:
+            self._set(usable, np.array([fit.predicted for fit in usable]))
 
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""
