@@ -14,10 +14,11 @@ from tensor_library.law_terms import LawTerm
 _SAME = 1e-6  # Relative deviation of coefficients up to which two laws are one
 
 
-def named_law(equation: Equation) -> tuple[str, dict[str, float]] | None:
-    """Return the named law that an equation is, with its constants; None where it is none.
+ByMode = tuple[float, ...]  # Of a constant: one value, or that of each mode where these differ
 
-    Of constants that differ from mode to mode, those of the first mode.
+
+def named_law(equation: Equation) -> tuple[str, dict[str, ByMode]] | None:
+    """Return the named law that an equation is, with its constants; None where it is none.
 
     Examples
     --------
@@ -27,12 +28,15 @@ def named_law(equation: Equation) -> tuple[str, dict[str, float]] | None:
     if equation.states or not equation.linear_relaxation:
         return None
     if equation.named is not None:
-        known = equation.named.law, dict(equation.named.of_mode(0))
-        return None if equation.terms else known
+        part = equation.named
+        first = part.of_mode(0)
+        each = {n: part.constants if n in part.differing else (first,) for n in first}
+        values = {name: tuple(one[name] for one in modes) for name, modes in each.items()}
+        return None if equation.terms else (part.law, values)
     return _of_terms(equation.terms)
 
 
-def _of_terms(terms: Sequence[LawTerm]) -> tuple[str, dict[str, float]] | None:
+def _of_terms(terms: Sequence[LawTerm]) -> tuple[str, dict[str, ByMode]] | None:
     names = tuple(sorted(term.term for term in terms))
     wanted = _numbers(terms)
     for name, law in LAWS.items():
@@ -50,7 +54,7 @@ def _of_terms(terms: Sequence[LawTerm]) -> tuple[str, dict[str, float]] | None:
         inside = np.clip(list(start.values()), low + 1e-9, high - 1e-9)
         found = least_squares(off, inside, bounds=(low, high), xtol=1e-12, ftol=1e-14, gtol=1e-14)
         if np.max(np.abs(found.fun)) <= _SAME * max(float(np.max(np.abs(wanted))), 1e-3):
-            return name, dict(zip(start, map(float, found.x), strict=True))
+            return name, {one: (float(v),) for one, v in zip(start, found.x, strict=True)}
     return None
 
 

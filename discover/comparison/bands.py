@@ -10,6 +10,7 @@ from discover.comparison.flows import MEASURED, Flow, Stresses, columns_of
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, make_batch
+from discover.forward.of_fluids import bare_run
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
@@ -128,10 +129,8 @@ def flow_run(flow: Flow, found: Found, runs: Mapping[str, Run]) -> Run:
 
 
 def run_of(flow: Flow) -> Run:
-    """Return a flow as a run of which nothing is recorded."""
-    nothing = np.zeros(len(flow.times))
-    strain = nothing if flow.records_strain else None
-    return Run(flow.name, flow.times, flow.protocol, flow.rate, nothing, strain=strain)
+    """Return a flow, with the rate as it was recorded, as a run of which nothing is recorded."""
+    return replace(bare_run(flow.protocol, flow.times, flow.name), rate=flow.rate)
 
 
 def in_flows(

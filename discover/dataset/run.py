@@ -37,7 +37,7 @@ _COLUMNS = (
     "storage_modulus", "loss_modulus",
 )  # fmt: skip
 # of quantities that are no column's name
-_COLUMN_OF = {
+COLUMN_OF = {
     "sigma12": "stress", "tensile_stress": "stress", "N1": "first_normal_stress_difference",
     "N2": "second_normal_stress_difference",
 }  # fmt: skip
@@ -203,7 +203,7 @@ class Run(NotebookView):
     @property
     def recorded(self) -> Float[np.ndarray, " n"]:
         """The values of that quantity, in Pa or dimensionless, shape (n,); InputError if none."""
-        values = getattr(self, _COLUMN_OF.get(self.quantity, self.quantity))
+        values = getattr(self, COLUMN_OF.get(self.quantity, self.quantity))
         if values is None:
             raise InputError(f"The run {self.name!r} has no {self.quantity}; it was not recorded.")
         return values
@@ -227,7 +227,7 @@ class Run(NotebookView):
     def beside(self) -> tuple[RecordedQuantity, ...]:
         """What was recorded next to σ12: N1, N2, both or neither."""
         both: tuple[RecordedQuantity, ...] = ("N1", "N2") if self.quantity == "sigma12" else ()
-        return tuple(one for one in both if getattr(self, _COLUMN_OF[one]) is not None)
+        return tuple(one for one in both if getattr(self, COLUMN_OF[one]) is not None)
 
     @property
     def records(self) -> "tuple[Run, ...]":

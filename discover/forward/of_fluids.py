@@ -13,7 +13,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.run import Run
+from discover.dataset.run import COLUMN_OF, Run
 from discover.forward.declared import DeclaredModel, Structure
 from discover.forward.flows import Batch, PeriodicFlows, make_batch
 from discover.forward.grid import STRAIN_STEP, had_gone_on
@@ -41,6 +41,8 @@ def bare_run(protocol: FlowProtocol, times: Float[np.ndarray, " n"], name: str =
         columns["strain"] = strains_in_table(protocol, times)
     if protocol.control == "oscillation":
         columns |= dict.fromkeys(MODULI, nothing)
+    if protocol.quantity in ("N1", "N2"):
+        columns[COLUMN_OF[protocol.quantity]] = nothing
     if protocol.control == "stress":
         return Run(name, times, protocol, nothing, nothing, **{"strain": nothing, **columns})
     return Run(name, times, protocol, shear_rates(protocol, times), nothing, **columns)

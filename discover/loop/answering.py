@@ -16,7 +16,7 @@ from discover.answer import (
 )
 from discover.answer import modes_in_words as modes
 from discover.answer.answer import EMPIRICAL
-from discover.answer.naming import named_law
+from discover.answer.naming import ByMode, named_law
 from discover.answer.simple_material import SimpleMaterial
 from discover.effects.registry import parameters_of
 from discover.equations import AugmentedLaw, Equation, law_parts
@@ -262,18 +262,7 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
     if name == "ucm" and not shows_a_derivative(result):
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
-    assert equation is not None
-    part = equation.named
-    own = {} if part is None else {n: [c[n] for c in part.constants] for n in part.differing}
-    return name, title, tuple(_over_modes(one, own) for one in _law_first(values, found))
-
-
-def _over_modes(one: Constant, by_mode: Mapping[str, Sequence[float]]) -> Constant:
-    """Return a constant with its mean and ends over the modes, where a law has one for each."""
-    values = by_mode.get(one.name)
-    if values is None or one.over_modes is not None:
-        return one
-    return replace(one, value=float(np.mean(values)), over_modes=(min(values), max(values)))
+    return name, title, tuple(_law_first(values, found))
 
 
 def shows_recovery(records: Sequence[RunRecord]) -> bool:
@@ -304,19 +293,22 @@ def shows_a_derivative(result: Any) -> bool:
     return other or by_quantity.normal_stress_settled(result)
 
 
-def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[Constant]:
+def _law_first(values: Mapping[str, ByMode], found: Sequence[Constant]) -> list[Constant]:
     """Return the constants of a law first, with the intervals of those that were fitted."""
     left, own = list(found), []
-    for name, value in values.items():
+    for name, of_modes in values.items():
         close = [
             one for one in left
-            if one.name == name or np.isclose(one.value, value, rtol=1e-6, atol=0.0)
+            if one.name == name or np.isclose(one.value, of_modes[0], rtol=1e-6, atol=0.0)
         ]  # fmt: skip
+        one = replace(close[0], name=name) if close else Constant(name, of_modes[0])
         if close:
             left.remove(close[0])
-            own.append(replace(close[0], name=name))
-        else:
-            own.append(Constant(name, value))
+        if len(of_modes) > 1 and one.over_modes is None:
+            one = replace(
+                one, value=float(np.mean(of_modes)), over_modes=(min(of_modes), max(of_modes))
+            )
+        own.append(one)
     return [*own, *left]
 
 

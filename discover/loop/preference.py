@@ -13,7 +13,7 @@ from itertools import islice
 import numpy as np
 from jaxtyping import Float
 
-from discover.answer.naming import named_law
+from discover.answer.naming import ByMode, named_law
 from discover.equations import Equation, StatePart
 from discover.errors import InputError
 from discover.inference.engine import Posterior
@@ -82,7 +82,10 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
 
 
 def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
-    """Return a hypothesis whose fluid is a law of the field, with intervals by its own fit."""
+    """Return a hypothesis whose fluid is a law of the field, with intervals by its own fit.
+
+    Of constants that were declared for each mode: their mean, and least and largest.
+    """
     found, fluid = law_of(posterior, fit), _fluid(posterior, fit)
     assert found is not None
     name, values = found
@@ -92,8 +95,8 @@ def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
         title=f"Best classical law of a closed loop: misses runs left out by {percent_of(size)}.",
     )
     constants = {}
-    for key, value in values.items():
-        ends = value, value  # one that was declared
+    for key, modes in values.items():
+        value, ends = float(np.mean(modes)), (min(modes), max(modes))  # as declared
         for at in fit.free:
             if fit.covariance is not None and np.isclose(fit.theta[at], value, rtol=1e-6, atol=0.0):
                 ends = fit.interval(at)
@@ -119,7 +122,7 @@ def is_thixotropic_maxwell(posterior: Posterior, fit: Fit) -> bool:
     return structures and law is not None and law[0] == "ucm"
 
 
-def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
+def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, ByMode]] | None:
     """Return the law of the field that the fluid of a hypothesis is, with its constants."""
     states, law = _states_and_law(posterior, fit)
     return law if states == () else None
@@ -127,7 +130,7 @@ def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | Non
 
 def _states_and_law(
     posterior: Posterior, fit: Fit
-) -> tuple[tuple[StatePart, ...] | None, tuple[str, dict[str, float]] | None]:
+) -> tuple[tuple[StatePart, ...] | None, tuple[str, dict[str, ByMode]] | None]:
     """Return structure variables of a fluid, and the law of the field that it is without them.
 
     Kept with the fit: several scans ask it of the same hypotheses.

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from independent.homogeneous import GiesekusFluid
 
+import discover as dc
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.of_fluids import bare_run, observed
 from discover.protocols import oscillations, oscillatory_shear, start_up
 from discover.protocols.control import steady_rates
 from discover.protocols.kinematics import RecordedQuantity
-from discover.protocols.protocol import in_flow
+from discover.protocols.protocol import in_flow, recording
 
 FLUID = GiesekusFluid((60.0, 20.0), (0.1, 2.0), 0.3, solvent_viscosity=1.0)
 TIMES = np.linspace(0.05, 3.0, 30)
@@ -103,6 +105,20 @@ def test_normal_stresses_are_those_of_runs_that_record_them(model):
         np.testing.assert_allclose(found[..., i], other, rtol=1e-10, atol=1e-9)
     # negative control: effects do something to what is recorded
     assert np.all(np.ptp(found[1:, 0, :, 0], axis=0) > 0.0)
+
+
+@pytest.mark.parametrize("quantity", ["N1", "N2"])
+def test_a_flow_that_records_a_normal_stress_can_be_followed_without_a_record(quantity):
+    of_shear, of_normal = (
+        make_batch([bare_run(flow, TIMES)])
+        for flow in (start_up(2.0), recording(start_up(2.0), quantity))
+    )
+    fluid = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.3}), [60.0], [2.0])
+    every, own = (observed([fluid], batch)[0, 0] for batch in (of_shear, of_normal))
+    column = 1 if quantity == "N1" else 2
+    # the same steps; sums of modes are taken in another order
+    np.testing.assert_allclose(own[:, 0], every[:, column], rtol=1e-10)
+    assert np.all(every[:, column] != every[:, 0])
 
 
 def test_a_sweep_has_no_normal_stresses(model):

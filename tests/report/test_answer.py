@@ -11,7 +11,7 @@ from discover.answer import Constant, Discrepancy, ExpectedError, Mode, Range, S
 from discover.answer.modes_in_words import linear_part, span
 from discover.answer.naming import named_law
 from discover.answer.simple_material import material_of
-from discover.equations import Equation
+from discover.equations import Equation, NamedPart
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
 from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
@@ -162,8 +162,14 @@ def test_a_sum_of_terms_is_known_by_its_name():
     slip = Equation((LawTerm("sigma.gammadot+gammadot.sigma", 0.2),))
     name, constants = named_law(slip)
     assert name == "johnson_segalman"
-    assert constants["xi"] == pytest.approx(0.4, rel=1e-6)
+    assert constants["xi"] == pytest.approx((0.4,), rel=1e-6)
     assert named_law(Equation((LawTerm("gammadot.gammadot", 1.0),))) is None
+
+
+def test_a_law_by_mode_has_the_constants_of_all_modes():
+    modes = ({"epsilon": 0.4, "xi": 0.1}, {"epsilon": 0.2, "xi": 0.1})
+    equation = Equation((), (1.0, 1.0), (2.0, 1.0), named=NamedPart("ptt_linear_non_affine", modes))
+    assert named_law(equation) == ("ptt_linear_non_affine", {"epsilon": (0.4, 0.2), "xi": (0.1,)})
 
 
 def test_a_suspected_share_is_a_percentage_of_something_and_others_have_units():
