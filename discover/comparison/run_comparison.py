@@ -35,11 +35,10 @@ from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
 from discover.loop.search_time import ComparisonTime
 from discover.loop.simple import simple_result
-from discover.loop.task import Task
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data
-from discover.study.declared_model import StudyModel, declared_model, forward_model
+from discover.study.declared_model import StudyModel, declared_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import counted
@@ -113,16 +112,14 @@ def compare(
     library = study_library(study) if library is None else library
     learning = Learning(study, options.seed if seed is None else seed, store, made)
 
-    if made is None:
-        model = forward_model(declared)
-        simple = simple_result(Task(model, (), data.fit.runs, data.held_out.runs))
-        if simple is not None:
-            progress("done", 1.0)
-            return _of_material(simple, study, data, declared, learning.seed)
     several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
     times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
+    simple = simple_result(found.task, found.posterior) if made is None else None
+    if simple is not None:
+        progress("done", 1.0)
+        return _of_material(simple, study, data, declared, learning.seed)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     times.learning()
 

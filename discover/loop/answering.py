@@ -158,7 +158,8 @@ def rest_of_h(equations: Sequence[str]) -> str:
 def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
-    to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
+    to_noise = result.verdict in EXPLAINED
+    to_noise &= result.error_after.fit <= _TO_NOISE * result.noise_floor
     left = by_quantity.of_fitted(result.records, result.error_after.fit, result.noise_floor)
     answer = Answer(
         material.title,

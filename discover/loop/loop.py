@@ -17,7 +17,6 @@ from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.free_functions import FreeForm, free_functions
-from discover.inference.engine.inelastic import inelastic
 from discover.inference.engine.search import Search
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.from_posterior import Ended, result_of
@@ -26,7 +25,7 @@ from discover.loop.parts import Fold
 from discover.loop.preference import with_named_law_first
 from discover.loop.runs import MOST_SAMPLES
 from discover.loop.search_time import SearchTime
-from discover.loop.simple import inelastic_result, simple_result
+from discover.loop.simple import simple_result
 from discover.loop.task import Say, Task
 from discover.progress import STATES, Progress, by_time
 from discover.study.data import StudyData, temperature
@@ -77,18 +76,12 @@ def run_loop(
         dataset, declared, fit, held_out, effects, max_effects, strain, noise, most_samples,
         progress, loading,
     )  # fmt: skip
-    result = None
-    if max_effects and (effects is None or effects == "named"):
-        task.say("yield stress, viscous fluid or solid")
-        result = simple_result(task)
+    found = search(task, laws)
+    result = simple_result(task, found.posterior) if max_effects else None
     if result is None:
-        found = search(task, laws)
-        viscous = inelastic(found.posterior) if max_effects else None
-        result = None if viscous is None else inelastic_result(task, viscous)
-        if result is None:
-            found = found.with_curves()
-            task.say("bands, intervals and the next test")
-            result = found.result(explanations)
+        found = found.with_curves()
+        task.say("bands, intervals and the next test")
+        result = found.result(explanations)
     return replace(result, seconds=time.perf_counter() - started)
 
 

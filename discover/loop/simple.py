@@ -1,13 +1,14 @@
-"""A closed loop that needs no search: a yield stress, a viscous fluid, a solid."""
+"""The result of a closed loop on a yield stress, a viscous fluid or a solid."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from discover.answer.simple_material import SimpleMaterial, material_of, recognise
+from discover.answer.simple_material import SimpleMaterial, material_of
 from discover.dataset import Run
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.inference.engine.inelastic import Inelastic
+from discover.inference.engine.posterior import Posterior
+from discover.inference.engine.simple_materials import simple_material
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
@@ -17,33 +18,19 @@ from discover.words import significant
 
 # Effect that is all that such a material has; another law stands for itself
 _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
-_ALREADY = ("saramito",)  # Laws that hold a yield stress themselves
 _AS_WELL = 1.1
 
 
-def simple_result(task: Task) -> LoopResult | None:
-    """Return the result for runs of a simple material; None where a law that relaxes is needed."""
-    material = None if task.declared.law_name in _ALREADY else recognise(task.fitted)
-    if material is None:
-        return None
-    return _result(task, material, 1.0, f"Recognised as a {material.title} before any search.")
+def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
+    """Return the result for runs of a simple material; None where a law that relaxes is needed.
 
-
-def inelastic_result(task: Task, found: Inelastic) -> LoopResult | None:
-    """Return the result where a law without elasticity is likelier than all that relax.
-
-    None where the declared law has this viscosity.
+    None as well where the declared law has this viscosity.
     """
-    material = material_of(found.law, found.values, found.ci95, found.error, found.onset)
+    found = simple_material(posterior)
+    if found is None:
+        return None
+    material = material_of(found)
     probability = 1.0 / (1.0 + float(np.exp(-found.log_odds)))
-    said = f"A {material.title} is likelier than all laws that relax."
-    return _result(task, material, probability, said)
-
-
-def _result(
-    task: Task, material: SimpleMaterial, probability: float, said: str
-) -> LoopResult | None:
-    """Return the result for a material; None if it is no better than the declared law."""
     if any(material.predict(run) is None for run in task.held_out):
         return None
     records: list[RunRecord] = []
@@ -62,17 +49,19 @@ def _result(
     effect = _EFFECT.get(material.law, material.law)
     stage = Stage(
         effect, "constitutive", parameters, (), after, 0.0, material.latex,
-        "least squares, compared with laws that relax by BIC", check_of(material),
+        "evidence, compared with laws that relax", check_of(material),
     )  # fmt: skip
     values = {one.name: one.value for one in material.constants}
     explanation = Explanation((effect,), probability, after, {effect: values})
+    explained = probability >= 0.5
+    verdict = "effects_added" if explained else "unexplained"
     return LoopResult(
-        "effects_added", before, after, noise or after.fit, (stage,),
+        verdict, before, after, noise or after.fit, (stage,),
         {
-            "structured": False, "error": after.fit, "noise_floor": noise or after.fit,
+            "structured": not explained, "error": after.fit, "noise_floor": noise or after.fit,
             "outliers": sum(map(len, task.spikes.values())), "outlier_times_s": task.spikes,
             "untested": why_untested(len(values), task.fitted, task.held_out),
-            "description": said,
+            "description": f"A {material.title} is likelier than all laws that relax.",
         },
         records=tuple(records),
         explanations=Explanations(

@@ -14,6 +14,7 @@ from discover.answer.simple_material import material_of
 from discover.equations import Equation, NamedPart
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
+from discover.inference.engine.simple_materials import SimpleFit
 from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
 from discover.report.first_screen import answer_screen
 from discover.study.schema import Verdict
@@ -358,12 +359,13 @@ def test_a_law_says_at_which_temperature_it_holds():
 
 
 def test_a_yield_stress_fluid_says_where_it_flows():
-    found = material_of("herschel_bulkley", (12.0, 3.0, 0.5), [(11, 13), (2, 4), (0.4, 0.6)], 0.01)
+    ends = (11.0, 13.0), (2.0, 4.0), (0.4, 0.6)
+    found = material_of(SimpleFit("herschel_bulkley", (12.0, 3.0, 0.5), ends, 0.01, 5.0))
     assert plain(found.formula).count("|σ_12| > τ_y") == 1
     assert "γ̇ = 0" in plain(found.formula)
     assert found.formula in found.latex
     assert "no flow up to a stress of 12 Pa" in found.written((), 0.01, 1e3)["python"]
-    newtonian = material_of("newtonian", (2.0,), [(1, 3)], 0.01)
+    newtonian = material_of(SimpleFit("newtonian", (2.0,), ((1.0, 3.0),), 0.01, 5.0))
     assert ">" not in newtonian.formula
 
 

@@ -40,7 +40,9 @@ TERMS = (0.0, 0.001, 0.005, 0.025, 0.12)
 """τ."""
 
 SCATTERS = (1.0, 6.0)
-"""By which runs may differ, over the usual: with a discrepancy or without, it is summed over."""
+"""By which runs may differ, over the usual: with a discrepancy or without, it is summed over. A fit
+in which they differ by more is one of no sound bench, and the discrepancy is the likelier by that.
+"""
 
 _SEEN = 1e-5
 """Length of a direction of the unused terms, over the records, down to which it is seen."""
@@ -125,8 +127,8 @@ class Discrepancy:
     `fitter`, `fit`: a hypothesis with derivatives, and what fitted it. `smallest`: what the least
     effect of the hypothesis takes away over the noise: a discrepancy is as likely of any size up to
     that. `names`: effects and terms that are not in the hypothesis. `log_factor`: log of how many
-    times likelier the records are with a discrepancy than without. `members`: the likeliest of the
-    grid.
+    times likelier the records are with a discrepancy than without. `log_evidence`: of the records
+    with one. `members`: the likeliest of the grid.
     """
 
     def __init__(self, fitter: Fitter, fit: Fit, smallest: float = np.inf):
@@ -147,7 +149,8 @@ class Discrepancy:
         self.columns = np.column_stack([fit.jacobian * self.widths, unused])
         self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
-        self._curves = _cosines(rows) * rows.size[:, None]  # of each row's own run
+        # over the values predicted: those recorded would bring their noise, which it explains then
+        self._curves = _cosines(rows) * rows.sizes_of(self.record)[:, None]
         curves = [
             *product(CURVES, STIFFNESS, GROWTHS),
             *product(CURVES, STIFFNESS[-1:], GROWTHS[:1], (True,)),
@@ -156,7 +159,8 @@ class Discrepancy:
             curves += product(CURVES, STIFFNESS, GROWTHS[:1], (False,), (True,))
         self._grid = [_Curve(*one) for one in curves]
         self._kept: dict[float, _Products] = {}
-        self.members, self.log_factor = self._weighed()
+        self.members, self.log_evidence, without = self._weighed()
+        self.log_factor = self.log_evidence - without
 
     def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
         problem = self.fitter.problem
@@ -267,7 +271,8 @@ class Discrepancy:
         shared += LEAST**2
         return np.sqrt(shared / np.mean(shared))
 
-    def _weighed(self) -> tuple[list[Member], float]:
+    def _weighed(self) -> tuple[list[Member], float, float]:
+        """Return the likeliest discrepancies, and the log evidence with one and without."""
         n, own = len(self.fitter.noise.kept), self._priors()
         some, plain = [], []
         for correlation in sorted({0.0, 0.45, 0.75, self.fit.noise.correlation}):
@@ -313,7 +318,7 @@ class Discrepancy:
                     size, stiff, growth, terms[0], which, correlation, log, float(noise), mean, root
                 )
             )
-        return members, total - none
+        return members, total, none
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
         """Return the log prior of each curve.

@@ -93,6 +93,11 @@ class Rows:
         most = _RUNAWAY * np.max(self.size, initial=0.0)
         return np.where(np.abs(found) <= most, found, np.nan)
 
+    def sizes_of(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " rows"]:
+        """Return the sizes with values of a curve as they are predicted, without their noise."""
+        alone = np.array([run.protocol.control in _CURVES for run in self.runs])
+        return np.where(alone[self.run], np.abs(predicted), self.size)
+
     def rms_by_run(self, values: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " runs"]:
         """Return the root mean square over the rows of each run."""
         count = np.bincount(self.run, minlength=len(self.runs))

@@ -1,0 +1,272 @@
+"""Simple materials as hypotheses: a viscous fluid, a yield stress, an elastic solid.
+
+Each is fitted in closed form to the same rows with the same noise as hypotheses that relax, and
+weighed by the same evidence. A viscous fluid may be seen in any shear at a given rate, in flow
+curves and in moduli; a solid in moduli and in shear from rest.
+"""
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset import Run
+from discover.inference.engine.closed_forms import (
+    CARREAU_YASUDA,
+    HERSCHEL_BULKLEY,
+    KELVIN_VOIGT,
+    MAXWELL,
+    NEWTONIAN,
+    POWER_LAW,
+    TWO_MODES,
+    recorded,
+    strain_of,
+)
+from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.posterior import NONE, SAME, Posterior
+from discover.inference.engine.priors import Prior
+from discover.linear_algebra_threads import in_one_thread
+from discover.protocols.kinematics import MODULI
+
+_NO_MATERIAL = ""
+"""No stress but that of the bench, which is what a material has to beat too."""
+
+_GOING_ON = "maxwell_going_on"
+"""A Maxwell mode with a solvent whose stress at the start of each run is not known: in steady
+alternation at one frequency it is a solid to the last digit, whatever its time."""
+
+_VISCOUS = NEWTONIAN, POWER_LAW, CARREAU_YASUDA, HERSCHEL_BULKLEY
+_WEIGHED = {"rate": _VISCOUS, "steady": _VISCOUS, "oscillation": (NEWTONIAN, KELVIN_VOIGT)}
+"""Hypotheses by what was imposed; a solid too where strains since rest are known."""
+
+_NAMED = {"steady": (NEWTONIAN, HERSCHEL_BULKLEY)}
+"""Of flow curves: any law that relaxes has one too, that thins as a viscous fluid may."""
+
+_RELAXING = {"rate": (MAXWELL, _GOING_ON, TWO_MODES), "oscillation": (MAXWELL, TWO_MODES)}
+"""Fluids that a solid must differ from: of times within the record, for one that relaxes later is
+that solid."""
+
+_AHEAD = 3.0
+"""Log evidence by which a yield stress must lead what has none: it is strong from there on
+[Kass & Raftery 1995, J. Am. Stat. Assoc. 90, 773]."""
+
+_UNKNOWN = float(np.log(NONE / (1.0 - NONE)))
+
+_ORDER = 3.0
+"""Standard deviation of the logarithm of a constant of which little is known."""
+
+_ENDS = 1e-12, 1e12
+_ROUNDS = 60
+_STRETCHES = 0.1, 1.0, 10.0
+_SHARPNESS = 0.7, 2.0
+_YIELDS = 0.3, 2.0
+_SHARP = 100.0
+"""m times the typical rate: the yield stress is there from a hundredth of it on."""
+
+_PLATEAU = 3.0
+"""Time of a viscosity that thins over that of the slowest rate, up to which its first plateau is in
+the range; without one it is a yield stress by another name."""
+
+_SEEN = 0.3
+"""Share of the smallest stress of a flow curve that a yield stress must be, to be measured."""
+
+_NEAR = 6.0
+"""Log odds by which a law that relaxes must lead to be needed where it predicts the same."""
+
+
+@dataclass(frozen=True)
+class SimpleFit:
+    """A simple material, as the runs show it.
+
+    Attributes
+    ----------
+    law
+        ``newtonian``, ``power_law``, ``carreau_yasuda``, ``herschel_bulkley`` or ``kelvin_voigt``.
+    values, ci95
+        Constants with their 95 % intervals: the viscosity in Pa s; K in Pa sⁿ and n; η0 and η∞ in
+        Pa s, k in s, n and a; τ_y in Pa, K in Pa sⁿ and n; or G in Pa and η in Pa s.
+    error
+        Relative misfit of the runs.
+    log_odds
+        That it is all there is: against what relaxes, and against any discrepancy.
+    onset
+        m in s, by which a yield stress sets in; None without one.
+    """
+
+    law: str
+    values: tuple[float, ...]
+    ci95: tuple[tuple[float, float], ...]
+    error: float
+    log_odds: float
+    onset: float | None = None
+
+
+class _ClosedForm(Fitter):
+    """Fits of a law in closed form to the rows of a problem."""
+
+    def __init__(self, fitter: Fitter, law: str):
+        problem = copy(fitter.problem)
+        problem.candidates, problem.modulus_root = (), None
+        super().__init__(problem, fitter.rows)
+        self.law = law
+        runs = self.rows.runs
+        control = runs[0].protocol.control
+        of_waves, self.is_curve = control == "oscillation", control == "steady"
+        rates = [run.angular_frequency if of_waves else run.rate for run in runs]
+        self.rates = np.abs(np.concatenate(rates))
+        moving = self.rates[self.rates != 0.0]
+        self.slowest, self.typical = np.min(moving), float(np.exp(np.mean(np.log(moving))))
+        self.longest = (
+            max(float(run.time[-1]) for run in runs) if not of_waves else 1 / self.slowest
+        )
+        strains = np.ones(1) if of_waves else np.concatenate([strain_of(run) for run in runs])
+        self.stress = float(np.sqrt(np.mean(self.rows.recorded**2)))
+        self.modulus = self.stress / max(float(np.sqrt(np.mean(strains**2))), 1e-300)
+
+    def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
+        """Return the priors of the constants, about what the records suggest."""
+        del names
+        size = self.stress / float(np.sqrt(np.mean(self.rates**2)))
+
+        def of(middle: float, high: float = np.inf) -> Prior:
+            low, most = (end * middle for end in _ENDS)
+            return Prior("logarithm", middle, _ORDER, low, min(high, most))
+
+        viscosity, index = of(size), Prior("normal", 0.5, 0.3, 0.0, 1.0)
+        modulus = of(self.modulus)
+        time = of(min(1.0 / self.typical, self.longest), self.longest)
+        thinning = of(1.0 / self.typical, _PLATEAU / self.slowest)
+        start = Prior("normal", 0.0, self.stress)
+        # at each rate of a flow curve it has set in: below that it were no yield stress
+        onset = () if self.is_curve else (of(_SHARP / self.typical),)
+        every = {
+            _NO_MATERIAL: (),
+            NEWTONIAN: (viscosity,),
+            POWER_LAW: (viscosity, index),
+            HERSCHEL_BULKLEY: (of(0.3 * self.stress), viscosity, index, *onset),
+            CARREAU_YASUDA: (
+                viscosity, of(0.01 * size), thinning, index, Prior("normal", 2.0, 1.0, 0.2, 8.0),
+            ),
+            KELVIN_VOIGT: (modulus, viscosity),
+            MAXWELL: (modulus, time, of(0.1 * size)),
+            _GOING_ON: (modulus, time, of(0.1 * size), *[start] * len(self.rows.runs)),
+            TWO_MODES: (modulus, time, modulus, time),
+        }  # fmt: skip
+        return dict(enumerate(every[self.law]))
+
+    def starts(self) -> list[Fit]:
+        """Return fits before their first step."""
+        middle = np.array([prior.middle for prior in self.priors(()).values()])
+        times = np.geomspace(0.01, 1.0, 5) * self.longest
+        if self.law == HERSCHEL_BULKLEY:
+            tried = [np.array([share * middle[0], *middle[1:]]) for share in _YIELDS]
+        elif self.law == CARREAU_YASUDA:
+            tried = [
+                np.array([*middle[:2], stretch * middle[2], middle[3], sharpness])
+                for stretch in _STRETCHES
+                for sharpness in _SHARPNESS
+            ]
+        elif self.law in (MAXWELL, _GOING_ON):
+            tried = [np.array([middle[0], time, *middle[2:]]) for time in times]
+        elif self.law == TWO_MODES:
+            tried = [np.array([middle[0], a, middle[2], b]) for a, b in combinations(times, 2)]
+        else:
+            tried = [middle]
+        return [self.start((), one) for one in tried]
+
+    def predict(
+        self,
+        thetas: Sequence[np.ndarray] | Float[np.ndarray, "trials p"],
+        moduli: Float[np.ndarray, "trials c"] | None = None,
+    ) -> Float[np.ndarray, "trials rows"]:
+        """Return the records of the law, in Pa; it has no moduli."""
+        del moduli
+        found = [np.concatenate(self._of(np.asarray(theta))) for theta in thetas]
+        return np.array(found).reshape(len(thetas), len(self.rows))
+
+    def _of(self, theta: np.ndarray) -> list[np.ndarray]:
+        runs = self.rows.runs
+        if self.law == _NO_MATERIAL:
+            return [np.zeros(len(run)) for run in runs]
+        if self.law != _GOING_ON:
+            return [recorded(self.law, theta, run) for run in runs]
+        kept = [np.exp(-run.time / theta[1]) for run in runs]
+        return [
+            recorded(MAXWELL, theta[:3], run) + start * left
+            for run, left, start in zip(runs, kept, theta[3:], strict=True)
+        ]
+
+
+def describes(control: str, run: Run) -> bool:
+    """Return whether simple materials say what a run records, where this is what was imposed."""
+    if run.protocol.control != control or control not in _WEIGHED:
+        return False
+    if control == "oscillation":
+        return run.quantity in MODULI and run.strain is not None
+    if run.flow != "shear" or run.quantity != "sigma12":
+        return False
+    moves = run.rate != 0.0
+    return bool(np.all(moves & (run.stress != 0.0)) if control == "steady" else np.any(moves))
+
+
+@in_one_thread
+def simple_material(posterior: Posterior) -> SimpleFit | None:
+    """Return the simple material that the runs show; None where a law that relaxes is needed.
+
+    One that predicts the same as the likeliest law that relaxes is preferred to it: elasticity that
+    no run shows is not claimed.
+    """
+    search, problem = posterior.search, posterior.problem
+    fitter, alive = search.fitter, search.alive()
+    runs = fitter.rows.runs
+    control = runs[0].protocol.control
+    if not all(describes(control, run) for run in runs) or not np.any(fitter.rows.recorded):
+        return None
+    from_rest = control == "rate" and all(run.from_rest for run in runs)
+    laws = (*_WEIGHED[control], *((KELVIN_VOIGT,) if from_rest else ()))
+    fits = {law: _fitted(fitter, law) for law in (_NO_MATERIAL, *laws)}
+    nothing = fits.pop(_NO_MATERIAL)[1].log_evidence
+    lead = {HERSCHEL_BULKLEY: _AHEAD}
+    law = max(fits, key=lambda name: fits[name][1].log_evidence - lead.get(name, 0.0))
+    fitted, fit = fits[law]
+    rank = fit.log_evidence + problem.log_odds_of(1.0)
+    if law not in _NAMED.get(control, laws) or not np.isfinite(rank):
+        return None
+    noise = fit.noise.sizes[fitter.rows.run] * fitter.rows.size
+
+    def is_same(record: Float[np.ndarray, " rows"]) -> bool:
+        return bool(np.sqrt(np.mean(((record - fitted.record(fit)) / noise) ** 2)) < SAME)
+
+    if law == KELVIN_VOIGT:
+        relaxing = (_fitted(fitter, name) for name in _RELAXING[control])
+        if any(is_same(own.record(one)) for own, one in relaxing):
+            return None
+    least = _SEEN * np.min(np.abs(fitter.rows.recorded)) if fitted.is_curve else 0.0
+    if law == HERSCHEL_BULKLEY and fit.theta[0] < least:
+        return None
+    others = -np.inf
+    if alive:
+        ranks = [search.rank(one) for one in alive]
+        if (left := posterior.left) is not None:
+            ranks.append(left.log_evidence + problem.log_prior(left.fit.names) + _UNKNOWN)
+        others = float(np.logaddexp.reduce(ranks))
+        others -= _NEAR if is_same(fitter.record(alive[0])) else 0.0
+    unknown = rank + Discrepancy(fitted, fit).log_factor + _UNKNOWN
+    if np.logaddexp(rank, unknown) < np.logaddexp(others, nothing):
+        return None
+    odds = rank - float(np.logaddexp.reduce([others, nothing, unknown]))
+    # how sharply a yield stress sets in is as much of the instrument as of the fluid
+    sets_in = law == HERSCHEL_BULKLEY and not fitted.is_curve
+    own, onset = (fit.free[:-1], float(fit.theta[-1])) if sets_in else (fit.free, None)
+    values = tuple(float(fit.theta[at]) for at in own)
+    return SimpleFit(law, values, tuple(map(fit.interval, own)), fitted.misfit(fit), odds, onset)
+
+
+def _fitted(fitter: Fitter, law: str) -> tuple[_ClosedForm, Fit]:
+    """Return the likeliest fit of a law, and what fitted it."""
+    own = _ClosedForm(fitter, law)
+    return own, max(own.fit(own.starts(), _ROUNDS), key=lambda fit: fit.log_evidence)
