@@ -6,15 +6,12 @@ a data folder and a study file and no more. The rules, written before the first 
 1. **No fluid**: any verdict but `unexplained` and `no_signal` is false. A refusal is as good.
 2. **Any verdict that claims to explain** is false where what is predicted misses the record
    without its noise by more than half the noise in the runs fitted, or than it in those held out.
-3. **Names**: under such a verdict of the loop every effect with a probability of a half or more is
+3. **Names**: under such a verdict every effect or term with a probability of a half or more is
    there, or is an alias of one that is. A name that is less likely than not is listed.
-4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others
-   but such whose interval holds zero, or that are told to be another declared constant that is
-   there.
-5. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
-6. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more
+4. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
+5. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more
    than two half-bands (rms); 1 % where there is no band.
-7. **Laws**: with `law = "any"` the law chosen is false if the truth is told apart from it.
+6. **Laws**: with `law = "any"` the law chosen is false if the truth is told apart from it.
 
 To say `unexplained` of what could be explained is no falsehood; it is noted.
 """
@@ -50,7 +47,6 @@ RULED_OUT = 0.05
 """Probability of a law among all named, below which the product tells it from its answer."""
 FLOOR = 2e-3
 """Of the rms: what sampling of the commanded rate and text cost."""
-CONSTANT = {"sigma": "relaxation_time_s", "gammadot": "modulus_Pa"}
 QUANTITY = {"stress_Pa": "sigma12", "tensile_stress_Pa": "tensile_stress"}
 GROUPS = {name: [n for n in cases if n != "all"] for name, cases in FILE["sets"].items()}
 
@@ -154,7 +150,6 @@ class Case:
         make tables beside them, and say what becomes of the runs once they have their noise.
     `planted`: effects that are there, with constants that are known.
     `same_as`: names that are no falsehood: they come to the same here, or describe the same thing.
-    `terms`: of the library, that are all that is missing; None where the library does not hold it.
     `outside`, `fluid`: whether no effect describes what is there, and whether there is a fluid.
     `model`, `compare_model`, `loop`, `compare`, `told`: sections of the studies; `compare` is False
         where no comparison is asked.
@@ -168,7 +163,6 @@ class Case:
     export: Callable | None = None
     planted: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     same_as: tuple[str, ...] = ()
-    terms: Mapping[str, float] | None = None
     outside: bool = False
     fluid: bool = True
     model: Mapping[str, Any] = field(default_factory=lambda: FILE["models"]["known"])
@@ -249,8 +243,8 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
 
 def judge(case: Case, question: str, said: dict, rows, clean: Runs, noisy: Runs) -> dict[str, Any]:
     """Return what is recorded of an answer: verdict, names, errors, falsehoods."""
-    sources = ["augmented"] if question == "close-loop" else list(said["learners"])
-    misses = {source: miss(case, rows, source, clean, noisy) for source in sources}
+    source = "augmented" if question == "close-loop" else "posterior"
+    misses = {source: miss(case, rows, source, clean, noisy)}
     found = {
         "verdict": said["verdict"], "misses": misses, "constants": [], "false": [], "notes": [],
     }  # fmt: skip
@@ -262,15 +256,14 @@ def judge(case: Case, question: str, said: dict, rows, clean: Runs, noisy: Runs)
     if confident and not case.fluid:
         found["false"].append(f"{said['verdict']}, where no fluid is")
     elif confident:
-        fit, held = min(misses.values())
+        fit, held = misses[source]
         open_ = {s["quantity"] for s in said.get("statements", []) if s["determined"] == "no"}
         if fit > DETECTABLE or held > HELD_OUT_DETECTABLE:
             text = f"{said['verdict']}, but misses by {fit:.2g}, held out {held:.2g} of the noise"
             # a law whose σ12 is said to be open claims nothing of the run held out
             only_held = fit <= DETECTABLE and "sigma12" in open_
             found["notes" if only_held else "false"].append(text)
-    inside = case.terms is not None if question == "compare" else case.fluid and not case.outside
-    if inside and said["verdict"] == "unexplained":
+    if case.fluid and not case.outside and said["verdict"] == "unexplained":
         found["notes"].append("not explained, though it could be")
     return found
 
@@ -303,33 +296,19 @@ def of_loop(case: Case, said: dict, found: dict) -> None:
 
 
 def of_compare(case: Case, said: dict, rows, clean: Runs, found: dict) -> None:
-    """Judge terms, their intervals, and the quantities said to be determined."""
-    terms = said["learners"]["tensor_sindy"]["terms"]
-    found["named"] = [[t["term"]] for t in terms]
+    """Judge the law of the posterior as one of a loop, and the quantities it has a number for."""
+    posterior = said["posterior"]
     found["undetermined"] = said["undetermined"]
-    if said["verdict"] != "explained":
+    explained = said["verdict"] == "explained"
+    verdict = "unexplained" if not explained else "effects_added"
+    keys = ("inclusion", "unexplained_probability")
+    law = {"verdict": verdict, "stages": posterior["effects"]} | {k: posterior[k] for k in keys}
+    of_loop(case, law, found)
+    if not explained:
         return
-    if case.terms is not None:
-        # a term that may be zero, as an interval says, is no claim
-        sure = {t["term"] for t in terms if not _holds_zero(t.get("ci95"))}
-        # nor is one of which it is told that it may as well be another declared constant, as it is
-        sure -= {
-            term for term, one in CONSTANT.items()
-            if one in said["undetermined"] and {term, one} & {*case.same_as}
-        }  # fmt: skip
-        if sure != set(case.terms):
-            law, truth = (", ".join(some) or "the declared one" for some in (sure, case.terms))
-            found["false"].append(f"the law is {law}, not {truth}")
-        for term in (t for t in terms if t["term"] in case.terms):
-            value = {"value": term["coefficient"], "ci95": term.get("ci95")}
-            _interval(term["term"], value, case.terms[term["term"]], found)
     open_ = {s["quantity"] for s in said["statements"] if s["determined"] == "no"}
     for quantity in {"N1", "N2", "sigma12"} - open_ - {*said["undetermined"]}:
         _band(quantity, rows, clean, found)
-
-
-def _holds_zero(interval) -> bool:
-    return interval is not None and None not in interval and interval[0] <= 0.0 <= interval[1]
 
 
 def _interval(name: str, value: dict, true: float, found: dict) -> None:
@@ -349,7 +328,7 @@ def _band(quantity: str, rows, clean: Runs, found: dict) -> None:
         truth = getattr(record, quantity, None)
         if quantity == "sigma12" and record.observed == "stress_Pa":
             truth = record.columns["stress_Pa"]
-        predicted = rows.get((run, quantity, "tensor_sindy"))
+        predicted = rows.get((run, quantity, "posterior"))
         if predicted is None or truth is None:
             continue
         scale = rms(truth if quantity == "sigma12" else record.N1)
