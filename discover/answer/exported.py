@@ -9,6 +9,7 @@ from discover.answer.simple_material import material_of
 from discover.equations.files import read_result
 from discover.equations.formats.rheotool import DENSITY
 from discover.errors import InputError
+from discover.inference.engine.simple_materials import SimpleFit
 from discover.plain_numbers import json_text
 from discover.words import unknown_name
 
@@ -39,10 +40,10 @@ def simple_material_text(folder: str | Path, form: str, density_kg_m3: float | N
 
 def _written(use: dict[str, Any], density: float) -> tuple[Answer, dict[str, str]]:
     constants: list[Any] = list(dict(use["constants"]).values())
-    values = [float(one["value"]) for one in constants]
-    ends = [[float(end) for end in one["ci95"] or (value, value)]
-            for one, value in zip(constants, values, strict=True)]  # fmt: skip
-    material = material_of(use["law"], values, ends, 0.0)
+    values = tuple(float(one["value"]) for one in constants)
+    both = ((one["ci95"] or (one["value"],) * 2) for one in constants)
+    ends = tuple((float(low), float(high)) for low, high in both)
+    material = material_of(SimpleFit(use["law"], values, ends, 0.0, 0.0))
     rates = use["range"]["rate_1_s"]
     found = Range(rate_1_s=None if rates is None else (float(rates[0]), float(rates[1])))
     error = use["expected_error"]["sigma12"]
