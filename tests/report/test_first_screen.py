@@ -175,6 +175,8 @@ def test_numbers_without_units_say_what_they_are():
     page = render("answer.html", screen=answer_screen(plain))
     assert '<abbr title="Weissenberg number:' in page
     assert '<abbr title="Deborah number:' in page
+    unseen = render("answer.html", screen=answer_screen(MELT))
+    assert 'left out in turn">unseen runs</abbr>' in unseen
 
 
 def test_a_residual_of_fitted_runs_is_no_expected_error():
