@@ -65,7 +65,7 @@ def _law(answer: Any, most: int) -> str:
         certain, named = [], [counted(every, "constant")] if most else []
     if several:
         # a solvent, or modes faster than the data: a melt has the one and no other
-        and_viscosity = answer.solvent_viscosity_Pa_s and "eta_s" not in (one.name for one in own)
+        and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
         named.append(counted(len(answer.modes), "mode") + " and η_s" * bool(and_viscosity))
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes

@@ -138,6 +138,9 @@ def test_a_viscosity_beside_the_modes_is_that_of_no_solvent_in_particular():
     fitted = (*MELT.constants, Constant("eta_s", 5.0, (4.0, 6.0), "Pa s"))
     told = replace(MELT, solvent_viscosity_Pa_s=5.0, constants=fitted).headline
     assert "η_s = 5.0 Pa s (4.0–6.0), 2 modes. " in told  # not twice
+    of_effect = (*MELT.constants, replace(fitted[-1], name="solvent_viscosity.eta_s"))
+    told = replace(MELT, solvent_viscosity_Pa_s=5.0, constants=of_effect).headline
+    assert "η_s = 5.0 Pa s (4.0–6.0), 2 modes. " in told
 
 
 @pytest.mark.parametrize(
