@@ -178,6 +178,9 @@ def by_steps(progress: Progress | None) -> Callable[[int, int, float], None]:
     return say
 
 
+resumable = Event()
+"""Set once there is a folder from which the same command goes on."""
+
 _registered: list[Callable[[], object]] = []
 
 

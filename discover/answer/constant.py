@@ -245,8 +245,8 @@ _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
     "relaxation_time_s": ("λ", "relaxation time"),
-    "modulus_factor": ("G/G_0", "factor on the moduli of the sweep"),
-    "relaxation_time_factor": ("λ/λ_0", "times of the sweep times"),
+    "modulus_factor": ("G/G_0", "fitted moduli, as listed below, over those of the sweep"),
+    "relaxation_time_factor": ("λ/λ_0", "fitted times, as listed below, over those of the sweep"),
     "eta_s": ("η_s", "Newtonian viscosity"),
     "L2": ("L²", "extensibility"),
     "stretch_time_ratio": ("θ", "stretch time ratio"),

@@ -62,7 +62,7 @@ def short(value: float) -> str:
 
 
 def linear_part(answer: Any) -> str:
-    """Return moduli, times and solvent of a law: of few modes all, of more from where to where."""
+    """Return moduli, times, solvent and shift factors; of more than a few modes their ends."""
     found = []
     modes = in_order(answer)
     for letter, unit, values in (
@@ -77,6 +77,7 @@ def linear_part(answer: Any) -> str:
             found.append(f"{letter} = {told} {unit}")
     if answer.solvent_viscosity_Pa_s:
         found.append(f"η_s = {as_constant(answer, answer.solvent_viscosity_Pa_s)} Pa s")
+    found += [f"a_T = {significant(one, 3)} at {degrees(at)}" for at, one in shifts(answer)]
     return ", ".join(found)
 
 

@@ -1,6 +1,6 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from discover.answer import modes_in_words as modes
@@ -31,7 +31,7 @@ def first_lines(answer: Any) -> tuple[str, str]:
     As short as need be: what gives way is in the table. Without a law, what stands in its place.
     """
     told = "", ""
-    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2)):
+    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3)):
         parts = description(answer, brief), answer.failed, where(answer)
         told = _law(answer, most), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
@@ -60,10 +60,12 @@ def _law(answer: Any, most: int) -> str:
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
     certain = [one for one in own if one.determined and not one.is_vague]
-    named = constants(certain[:most])
+    named, every = constants(certain[:most]), len(answer.constants)
+    if answer.law is None and every > min(most, len(certain)):  # some alone are no law
+        certain, named = [], [counted(every, "constant")] if most else []
     if several:
         # a solvent, or modes faster than the data: a melt has the one and no other
-        and_viscosity = answer.solvent_viscosity_Pa_s and "eta_s" not in (one.name for one in own)
+        and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
         named.append(counted(len(answer.modes), "mode") + " and η_s" * bool(and_viscosity))
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
@@ -74,10 +76,8 @@ def _law(answer: Any, most: int) -> str:
         if known and differ(one.ci95, answer.tolerance):
             level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
             named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
-    if answer.temperature_C is not None:
-        # the rates of use are not at the one that times are reduced to
-        what = "reference temperature" if answer.shift_factors else "at"
-        named.append(f"{what} {modes.degrees(answer.temperature_C)}")
+    if answer.temperature_C is not None and not answer.shift_factors:
+        named.append(f"at {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
 
@@ -112,22 +112,24 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
 
 
 def description(answer: Any, brief: int = 0) -> str:
-    """Return how well the law describes the runs, assuming what, and if that is enough.
+    """Return how well the law describes the runs, allowing for what, and if that is enough.
 
-    `brief`: 1 without counts of runs and names of suspects, 2 without other rates too.
+    `brief`: 1 without counts of runs and names of suspects, 2 without other rates, 3 without
+    interval.
     """
     if not answer.title:
         return ""
-    scatter = "point scatter" if answer.range.steady else "noise"
+    scatter = "the flow curve within its scatter" if answer.range.steady else "within the noise"
     noise = "" if answer.noise is None else percent_of(answer.noise)
     found = answer.discrepancy
     if answer.fits_to_the_noise:
-        said = f"Fits within the {scatter}{f' of {noise}' if noise else ''}"
+        said = f"Fits {scatter}{f' of {noise}' if noise else ''}"
     elif found is None or not found.size:
         said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-        size = f"{percent_of(found.size)}{f' ({_LEVEL}{low}–{high} %)' if low != high else ''}"
+        ends = f" ({_LEVEL}{low}–{high} %)" if low != high and brief < 3 else ""
+        size = f"{percent_of(found.size)}{ends}"
         # of fitted runs it is no error that a prediction could have
         said = _of_unseen(answer, size, brief) if found.unseen else _OF_FITTED + size
         # an error below the noise is known no better than that
@@ -163,29 +165,29 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
 
 
 def _corrected(answer: Any, brief: int) -> str:
-    """Return what of the instrument the errors assume; empty where nothing."""
+    """Return what of the instrument the errors allow for; empty where nothing."""
     names = [effect_title(one.effect) for one in answer.suspects]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
     told = listed(names) if few else f"{len(names)} measurement errors"
-    if len(names) == 1 and (one := answer.suspects[0]).amplitude and one.is_separate:
-        told += f" {one.amplitude.number}"
     # no instrument shapes what is measured in extension
     what = "" if set(answer.range.flows) <= {"shear"} else " in shear"
-    return f"assuming {told}{what}" if names else ""
+    return f"allowing for {told}{what}" if names else ""
 
 
 _MOST_SUSPECTS = 2
 
 
 def tolerance(answer: Any, brief: int = 0) -> str:
-    """Return up to which rate the tolerance is met, else unless `brief` in how many runs."""
-    if answer.adequate is None:
+    """Return whether the tolerance is met, unless `brief` in how many runs.
+
+    Empty where `where` says up to which rate.
+    """
+    over = len(_over_tolerance(answer))
+    if answer.adequate is None or (over and answer.discrepancy.met_up_to):
         return ""
-    over, every = len(_over_tolerance(answer)), len(_by_run(answer))
     state = "met" if answer.adequate else "missed"
-    if over and answer.discrepancy.met_up_to:
-        state = f"met up to {answer.discrepancy.met_up_to}"
-    elif over and (not brief or answer.adequate):
+    if over and (not brief or answer.adequate):
+        every = len(answer.discrepancy.by_run)
         state = f"met in {every - over or 'none'} of {counted(every, 'run')}"
     return f"tolerance {percent_of(answer.tolerance)} {state}"
 
@@ -234,9 +236,11 @@ def where(answer: Any) -> str:
     only = " only" * (len(quantities) == 1 and not implied)
     mean = "" if answer.adequate is not False else percent_of(answer.size)
     _, least = worst_run(answer) or ("", mean)
-    use = f"Where {least} suffices, use" if least else "Use"
+    use, ends = f"Where {least} suffices, use" if least else "Use", ""
+    if least and (met := answer.discrepancy and answer.discrepancy.met_up_to):
+        use, ends = "Use", f": within {percent_of(answer.tolerance)} up to {met}, {least} above"
     more = f" ({listed(implied)}: predicted, not tested)" if implied else ""
-    return f"{use} for {listed(quantities)}{only}{more}, {place}."
+    return f"{use} for {listed(quantities)}{only}{more}, {place}{ends}."
 
 
 def _place(answer: Any) -> str:
@@ -254,11 +258,12 @@ def _place(answer: Any) -> str:
             slow = f", {'steady or ' * near}oscillating at De = λω {ends}"
         rate = "" if one.rate_1_s is None else f" ({modes.short(one.rate_1_s[1])} 1/s)"
         return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{rate}{slow}"
+    tests = f"{listed(one.tests)} at " if one.tests else ""
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
-        return f"{rates}{reduced}" if (rates := _rates(one)) else ""
+        return f"{tests}{rates}{reduced}" if (rates := _rates(one)) else ""
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
-    return listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}"
+    return tests + (listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}")
 
 
 _NEARLY_STEADY = 0.5  # Deborah number below which a fluid relaxes several times in each cycle
@@ -278,12 +283,8 @@ def _rates(one: Any) -> str:
 
 def _over_tolerance(answer: Any) -> dict[str, float]:
     """Return runs that are missed by more than the tolerance, with their discrepancy."""
-    return {name: size for name, size in _by_run(answer).items() if size > answer.tolerance}
-
-
-def _by_run(answer: Any) -> Mapping[str, float]:
-    """Return the discrepancy by run; empty where it is unknown."""
-    return {} if answer.discrepancy is None else answer.discrepancy.by_run
+    by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
+    return {name: size for name, size in by_run.items() if size > answer.tolerance}
 
 
 def worst_run(answer: Any) -> tuple[str, str] | None:
@@ -339,7 +340,7 @@ def errors(answer: Any) -> list[Row]:
 
 def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
-    of = "Fit residual" if answer.expected("sigma12").is_residual else "Model error"
+    of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
     return f"{of} (noise subtracted)"
 
 

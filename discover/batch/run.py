@@ -19,7 +19,7 @@ from discover.batch.workers import run_in_workers, run_on_cluster
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError, plain_os_error
 from discover.first_use import enable_x64
-from discover.progress import FollowedBy, Progress, on_stop
+from discover.progress import FollowedBy, Progress, on_stop, resumable
 from discover.study.atomic import make_folder, require_free
 from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -141,6 +141,7 @@ def run_batch(
     studies would write to one folder, or `out` cannot be written to.
     """
     make_folder(out)
+    resumable.set()
     if not overwrite:
         require_free(out, SUMMARY_FILES, STATES)
     jobs = [

@@ -17,7 +17,7 @@ from typer import Argument, Option
 
 from discover.errors import InputError, plain_os_error, problems_in
 from discover.inputs_kept import inputs_kept
-from discover.progress import on_stop, run_stop_callbacks
+from discover.progress import on_stop, resumable, run_stop_callbacks
 
 Report = Callable[[str, float], None]
 
@@ -135,9 +135,12 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 3600:.1f} h"
 
 
-INTERRUPTED = (
-    "interrupted. What was finished is kept; to go on from there, run the same command again."
-)
+def interrupted() -> str:
+    """Return what Ctrl-C leaves: of a command that has no folder yet, nothing."""
+    kept = " What was finished is kept; to go on from there, run the same command again."
+    return f"interrupted.{kept if resumable.is_set() else ''}"
+
+
 INTERRUPTED_CODE = 128 + signal.SIGINT
 """Exit code of a program that Ctrl-C ended, as shells know it."""
 
@@ -191,7 +194,7 @@ def obeying_interrupts() -> Iterator[None]:
 
 
 def _leave() -> None:
-    say_error(INTERRUPTED)
+    say_error(interrupted())
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # a pipe that nobody reads any more
             stream.flush()
@@ -215,7 +218,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         except InputError as error:
             _fail(str(error), 2)
         except KeyboardInterrupt:
-            _fail(INTERRUPTED, INTERRUPTED_CODE)
+            _fail(interrupted(), INTERRUPTED_CODE)
         except Exception as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise

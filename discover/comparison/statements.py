@@ -106,7 +106,7 @@ def _said_of(quantity, verdict, flows, bands, structure, spread, terms) -> State
     """Return the statement on one quantity; parameters as in `make_statements`."""
     differ, of_n1 = spread.get(quantity), " of N1" if quantity == "N2" else ""
     if verdict == "unexplained":
-        said = "" if differ is None else f"; model spread {percent_of(differ)}{of_n1}"
+        said = f"; the nearest differ by {percent_of(differ)}{of_n1}" if differ is not None else ""
         return Statement(quantity, "no", _UNEXPLAINED.format(said))
     if only_states(flows):
         return Statement(quantity, "no", ONLY_STATES)

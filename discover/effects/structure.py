@@ -106,7 +106,7 @@ BUILD_UP_TIME = EffectParameter(
     meaning="build-up time",
     range_source="as for thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
 )  # fmt: skip
-_FAST = replace(BUILD_UP_TIME, meaning="fast build-up time")
+_FAST = replace(BUILD_UP_TIME, meaning="build-up time of the fast structure, i = 1")
 
 EXPONENT = EffectParameter(
     "exponent", "m", low=0.1, high=4.0, first_trial=1.0,
@@ -117,14 +117,14 @@ EXPONENT = EffectParameter(
 
 SLOWNESS = EffectParameter(
     "slowness", "R", low=2.0, high=1e4, first_trial=30.0,
-    meaning="ratio of slow to fast build-up time",
+    meaning="slow over fast build-up time",
     range_source="structure times less than a factor of two apart count as one (those of Wei, "
     "Solomon & Larson 2018 spread over decades)",
 )  # fmt: skip
 
 SLOW_SHARE = EffectParameter(
     "slow_share", "w", low=0.01, high=0.99, first_trial=0.1,
-    meaning="share of the slow structure",
+    meaning="share of the slow structure, i = 2",
     range_source="with less than one part in a hundred of either there is only one structure",
 )  # fmt: skip
 

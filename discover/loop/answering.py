@@ -320,6 +320,8 @@ def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     if stage.kind != "constitutive" or stage.effect in (*LAW_OF_EFFECT, *STRUCTURES):
         return found
     first, *others = found
+    if not Suspect(stage.effect, found).is_established:
+        return found
     odds = float(np.exp(min(0.5 * stage.evidence, 10.0)))
     told = f"odds for it {f'> {_SURE}' if odds > _SURE else significant(odds, 2)}:1"
     return replace(first, meaning="; ".join(filter(None, [first.said, told]))), *others
@@ -366,14 +368,15 @@ def _renamed(
     if "sigma" in effect or "gammadot" in effect:
         first, *inner = constants
         constants = [replace(first, name=effect), *inner]
-    names = [one.name for one in taken]
+    said = {one.name: one.said for one in taken}
+    # what is not told apart by its meaning is by the effect
     return [
         replace(
             one,
             name=f"{effect}.{one.name}",
-            meaning=f"{one.meaning or one.said} ({effect_title(effect)})",
+            meaning=one.said + f" ({effect_title(effect)})" * (one.said == said[one.name]),
         )
-        if one.name in names
+        if one.name in said
         else one
         for one in constants
     ]

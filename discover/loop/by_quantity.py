@@ -13,7 +13,7 @@ from discover.answer.sentences import MEASURED_AT, at_most
 from discover.loop.fitted_range import by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
-from discover.words import listed, percent_of, significant
+from discover.words import counted, listed, percent_of, significant
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
@@ -26,7 +26,7 @@ FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
 _UNSEEN, _FITTED = "unseen runs", "fitted runs"
-_LEFT_OUT, _HELD_OUT = "cross-validation", "validation runs"
+_DIFFER = "laws that fit as well differ by"
 _TWICE = "estimated at twice the highest rate"
 
 
@@ -73,17 +73,6 @@ def _met_up_to(result: Any, by_run: Mapping[str, float]) -> str:
     return "" if several or not met else f"{span((met[-1].unshifted.fastest,) * 2)} 1/s"
 
 
-def _which(result: Any, own: Mapping[str, float]) -> str:
-    """Return of which unseen runs errors are; the two means where they are of both."""
-    left = {*result.left_out, *(fold.run for fold in result.folds)}
-    kinds: dict[str, list[float]] = {}
-    for name, error in own.items():
-        kinds.setdefault(_LEFT_OUT if name in left else _HELD_OUT, []).append(error)
-    means = {kind: _mean(errors) for kind, errors in sorted(kinds.items())}
-    said = [f"{kind} {percent_of(one)}" for kind, one in means.items() if one is not None]
-    return f"{', '.join(said)}, pooled" if len(kinds) > 1 else "".join(kinds)
-
-
 def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
     """Return errors without noise, by name of runs left out in turn, and of those held out.
 
@@ -127,16 +116,16 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
         if own is not None:
             unseen = unseen_errors(result, kind)
             if (inside := _mean([*unseen.values()])) is not None:
-                own = replace(own, inside=inside, note=_which(result, unseen), is_residual=False)
+                note = counted(len(unseen), "unseen run")
+                own = replace(own, inside=inside, note=note, is_residual=False)
             found[kind] = own
             continue
         apart = differing(result, kind)
-        differ = "" if apart is None else f"model spread {at_most(apart)}"
-        above = f" > {percent_of(_APART)}" if apart is not None and apart >= _APART else ""
+        differ = "" if apart is None else f"{_DIFFER} {at_most(apart)}"
+        above = f", limit {percent_of(_APART)}" if apart is not None and apart >= _APART else ""
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
-            beyond = None if beyond is None else max(beyond, apart)
-            note = f"{_without_data(result)}: model spread"
+            note = f"{_without_data(result)}: {_DIFFER} this"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
         elif kind == "N2":
             found[kind] = _second_difference(result, differ)
@@ -148,15 +137,15 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
 
 
 def _without_data(result: Any) -> str:
-    """Return why nothing tests N1: it was not recorded, or is not used (`[data] observe`)."""
-    return "not used" if any(record.has_normal_stress for record in result.records) else "no data"
+    """Return why nothing tests N1: it was not recorded, or is not fitted (`[data] observe`)."""
+    return "not fitted" if any(record.has_normal_stress for record in result.records) else "no data"
 
 
 def _second_difference(result: Any, differ: str) -> ExpectedError:
     """Return what is said of N2 where nothing measured it: that of the law, unless laws differ."""
     apart, spread = differing(result, "N2"), result.spread_of_laws.get("N2")
     if apart and apart > _WORTH_SAYING:
-        note = f"{differ} of N1 > {percent_of(_WORTH_SAYING)}"
+        note = f"{differ} of N1, limit {percent_of(_WORTH_SAYING)}"
         return ExpectedError(missing="not determined", note=note)
     ratio = None if spread is None else spread.over_n1
     if ratio is None:
@@ -189,11 +178,12 @@ def of_stress(result: Any) -> ExpectedError:
     beyond, at = own.beyond, own.beyond_at
     spread = result.spread_of_laws.get("sigma12")
     if beyond is None and spread is not None and spread.beyond is not None:
-        beyond, at = max(spread.beyond, inside or 0.0), _TWICE
+        beyond, at = spread.beyond, _TWICE
     if inside is None and result.material is not None:
         inside = beyond_noise(result.error_after.fit, result.noise_floor)
         return ExpectedError(inside, beyond, at, note=_FITTED, is_residual=True)
-    return ExpectedError(inside, beyond, at, note=_which(result, errors))
+    note = counted(len(errors), "unseen run") if errors else ""
+    return ExpectedError(inside, beyond, at, note=note)
 
 
 def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
@@ -211,7 +201,7 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
     inside, beyond = (
         _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )
-    note = _HELD_OUT if held else _FITTED
+    note = _UNSEEN if held else _FITTED
     if held and slow:
         rates = [record.unshifted.fastest for record in slow]
         note += f", {span((min(rates), max(rates)))} 1/s"

@@ -14,6 +14,7 @@ from discover.loop.runs import RunRecord
 _TURNS = 0.5
 # Share of the time of a run for which it is at most as slow as the slowest rate of its range
 _STAYS = 0.05
+_SAME = 0.8  # Share of the largest rate above which a rate that was read is one rate
 # Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop
 _AT_REST = 1e-3
 
@@ -57,6 +58,7 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
     # one that turns has a frequency besides its rate
     found = [flow_numbers(r.time, r.rate, 1.0)[1] for r in turned]
     sizes = [0.5 * float(np.nanmax(r.strain) - np.nanmin(r.strain)) for r in turned]
+    tests = dict.fromkeys(test for r in fitted if (test := _test(r)))
     return Range(
         None if box is None else box.weissenberg,
         None if box is None else box.deborah,
@@ -67,11 +69,22 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
         bool(turned),
         amplitude=(min(sizes), max(sizes)) if sizes and len(sizes) == len(fitted) else None,
         steady=bool(fitted) and all(r.control == "steady" for r in fitted),
+        tests=tuple(sorted(tests, reverse=True)),  # start-up before creep and oscillation
     )
 
 
 def _turns(record: RunRecord) -> bool:
     return record.is_transient and bool(np.min(record.rate) < -_TURNS * record.fastest)
+
+
+def _test(record: RunRecord) -> str:
+    """Return what a transient is, in words; empty of what turns, and of states."""
+    if not record.is_transient or _turns(record):
+        return ""
+    if record.control == "stress":
+        return "creep"
+    rates = np.abs(record.rate)
+    return "start-up" if np.percentile(rates, 5.0) > _SAME * record.fastest else "steps of rate"
 
 
 def _rates_of(record: RunRecord) -> list[float]:

@@ -143,8 +143,8 @@ def _unfitted(result: Any) -> str:
     others = [r for r in result.records if (r.flow, r.quantity) not in fitted]
     for kind in ("N1", "uniaxial"):
         own = measured(others, kind, result.noise_floor)
-        if own is not None and (error := own.inside or own.beyond or 0.0) > result.tolerance:
-            return f"Fit {SYMBOLS[kind]} too (error {words.percent_of(error)}),"
+        if own is not None and (own.inside or own.beyond or 0.0) > result.tolerance:
+            return f"Fit {SYMBOLS[kind]} too,"
     return ""
 
 

@@ -90,8 +90,8 @@ def check_of(material: SimpleMaterial) -> str:
         return _CHECKS[material.kind]
     first, *_ = material.constants
     low, high = first.ci95 or (first.value, first.value)
-    ends = (significant(end, 2) for end in (_BELOW * low, high / _BELOW))
-    return f"Creep at {' and '.join(ends)} Pa, below and above τ_y: does it flow?"
+    below, above = (significant(end, 2) for end in (_BELOW * low, high / _BELOW))
+    return f"Creep at {below} Pa and {above} Pa: it should flow at {above} Pa alone."
 
 
 _BELOW = 0.9  # Stress of a creep over the yield stress, far enough from it to be told in an hour

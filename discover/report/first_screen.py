@@ -35,10 +35,10 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
                 symbols[i] = one.symbol.replace("σ", "τ")
                 headline = headline.replace(one.symbol, symbols[i])
     ends = answer.range.rate_1_s
-    shifted = [
-        ("a_T", f"at {modes.degrees(at)}: times {modes.shortened(one)}"
-         + unbroken(f"; range {modes.span((ends[0] / one, ends[1] / one))} 1/s" if ends else ""),
-         words.significant(one, 3), "") for at, one in modes.shifts(answer)
+    shifts = [
+        (modes.degrees(at), words.significant(one, 3),
+         modes.span((ends[0] / one, ends[1] / one)) if ends else "–")
+        for at, one in modes.shifts(answer)
     ]  # fmt: skip
     timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
     clock = "; times on the instrument's clock" if timed and answer.shift_factors else ""
@@ -51,10 +51,10 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "open": not answer.title or answer.adequate is False or bool(sentences.worst_run(answer)),
         "law": _typeset(answer),
         "constants": [
-            *((symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
-              for symbol, one in zip(symbols, answer.constants, strict=True)),
-            *shifted,
+            (symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
+            for symbol, one in zip(symbols, answer.constants, strict=True)
         ],
+        "shifts": shifts,
         "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
         "suspected": sentences.SUSPECTED.lower() + clock,
         "expected": sentences.errors(answer) if answer.title else (),
@@ -96,21 +96,11 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
 
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
-    lines = [*_of_sweep(answer), *answer.written.get("formula", "").splitlines()]
+    lines = answer.written.get("formula", "").splitlines()
     if equation is None:
         return _formulas(lines)
     rest = any(line.startswith("h = ") for line in lines)
     return _law(_rounded(equation, answer), rest) + _formulas(lines)
-
-
-def _of_sweep(answer: Answer) -> list[str]:
-    """Return how the modes follow from those of the sweep, in LaTeX; empty where they are these."""
-    letters = {"modulus_factor": "G", "relaxation_time_factor": r"\lambda"}
-    factors = [(letters[c.name], c.number) for c in answer.constants if c.name in letters]
-    parts = [rf"{letter}_k = {number}\,{letter}_{{0k}}" for letter, number in factors]
-    if parts and any(modes.is_added(answer, mode) for mode in answer.modes):
-        parts = [rf"k = 1,\ldots,{len(answer.modes) - 1},+", *(rf"{p}\ (k \neq +)" for p in parts)]
-    return [r",\quad".join(parts)] if parts else []
 
 
 def _rounded(equation: Equation, answer: Answer) -> Equation:
@@ -183,7 +173,8 @@ def _at_rest(states: Sequence[str], effect: StateEffect) -> str:
     """Return what the states of a fluid are at rest, as it goes on behind their equation."""
     index = "" if effect.levels == 1 else "_i"
     rest = rf"{index} = {effect.rest:g}\ \mathrm{{at\ rest}}"
-    return "".join(rf",\quad {state}{rest}" for state in states)
+    what = r"\mathrm{structure}\ " if effect.rest else ""
+    return "".join(rf",\quad {what}{state}{rest}" for state in states)
 
 
 def _copies(answer: Answer) -> list[Mapping[str, str]]:

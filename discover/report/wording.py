@@ -155,19 +155,20 @@ def subscripts(text: str) -> Markup:
     return Markup(_LOWERED.sub(r"\1<sub>\2</sub>", str(escape(text))))
 
 
-_NUMERALS = {
+_EXPLAINED = {
     "Wi": "Weissenberg number: mean relaxation time λ times the largest shear rate",
     "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
+    "unseen runs": "runs that a fit did not use: held out, or left out in turn",
 }
 
 
 def explained(text: str) -> Markup:
-    """Return text, escaped, whose dimensionless numbers say what they are where one points."""
+    """Return text, escaped, whose numerals and unseen runs say what they are where one points."""
 
     def said(found: re.Match[str]) -> str:
-        return f'<abbr title="{_NUMERALS[found[0]]}">{found[0]}</abbr>'
+        return f'<abbr title="{_EXPLAINED[found[0]]}">{found[0]}</abbr>'
 
-    return Markup(re.sub(rf"\b({'|'.join(_NUMERALS)})(?=\s=)", said, str(subscripts(text))))
+    return Markup(re.sub(r"\b(?:(?:Wi|De)(?=\s=)|unseen runs)", said, str(subscripts(text))))
 
 
 def in_cell(text: str) -> str:

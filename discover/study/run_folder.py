@@ -11,6 +11,7 @@ from typing import Any
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.plain_numbers import parse_json
+from discover.progress import resumable
 from discover.study.atomic import PART_SUFFIX, lock_folder, make_folder, require_free, write_text
 
 STATE_FOLDER = "state"
@@ -65,6 +66,7 @@ class RunFolder:
         self._files: dict[str, Any] = files if isinstance(files, dict) else {}
         if found is None:
             self._write_state(False)
+        resumable.set()
 
     def load(self, part: str) -> dict[str, Any] | None:
         """Return a finished part, or None if it has to be computed."""

@@ -91,7 +91,7 @@ def test_a_wrong_request_is_one_line_and_exit_code_2(results, arguments, word):
         ("comparison.json", '{"learners": {"tensor_sindy": {"law": {}}}}', "format"),
         ("loop.json", '{"law": null, "law_missing": "thixotropy has a state"}', "thixotropy"),
         ("batch.json", "{}", "one study"),
-        ("nothing.txt", "", "neither comparison.json nor loop.json"),
+        ("nothing.txt", "", "no comparison.json, loop.json or fit.json"),
     ],
 )
 def test_results_that_hold_no_law_say_so(tmp_path, name, text, word):

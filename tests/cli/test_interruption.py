@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -11,8 +12,9 @@ import typer
 from typer.testing import CliRunner
 
 from discover.cli import console
-from discover.cli.console import INTERRUPTED, INTERRUPTED_CODE, guarded, obeying_interrupts
+from discover.cli.console import INTERRUPTED_CODE, guarded, obeying_interrupts
 from discover.errors import InputError
+from discover.study import run_folder
 
 # a call without a Python instruction for minutes, as the compiler's are
 AT_WORK = """
@@ -56,14 +58,14 @@ def interrupted(*arguments):
 
 def test_a_call_that_python_cannot_interrupt_is_left_with_one_line():
     out, err, code, seconds = interrupted("10.0", "0.0")
-    assert (out, err, code) == ("last words\n", f"discover: {INTERRUPTED}\n", INTERRUPTED_CODE)
+    assert (out, err, code) == ("last words\n", "discover: interrupted.\n", INTERRUPTED_CODE)
     assert INTERRUPTED_CODE == 130
     assert seconds < 15  # and not the hour that the call takes
 
 
 def test_last_words_that_do_not_end_are_cut_short():
     out, err, code, _ = interrupted("0.2", "60.0")
-    assert (out, err, code) == ("", f"discover: {INTERRUPTED}\n", INTERRUPTED_CODE)
+    assert (out, err, code) == ("", "discover: interrupted.\n", INTERRUPTED_CODE)
 
 
 def test_who_ignores_the_signal_goes_on_ignoring_it(monkeypatch):
@@ -96,7 +98,7 @@ def ended_with(error):
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
-        (KeyboardInterrupt(), 130, "run the same command again"),
+        (KeyboardInterrupt(), 130, "interrupted."),
         (InputError("there is no run 'a'"), 2, "there is no run 'a'"),
         (PermissionError(13, "Permission denied", "out"), 1, "out"),
         (
@@ -118,3 +120,11 @@ def test_each_end_has_a_code_of_its_own_and_says_what_to_do(error, code, said, m
 def test_a_command_that_ends_well_says_nothing():
     done = ended_with(typer.Exit())
     assert (done.exit_code, done.output) == (0, "")
+
+
+def test_what_was_finished_is_kept_only_once_there_is_a_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(console, "resumable", event := threading.Event())
+    monkeypatch.setattr(run_folder, "resumable", event)
+    assert console.interrupted() == "interrupted."
+    run_folder.RunFolder(tmp_path, "a study")
+    assert "run the same command again" in console.interrupted()

@@ -8,6 +8,7 @@ from discover.dataset.importing import import_files
 from discover.dataset.importing.mapping import Mapping, make_mapping
 from discover.dataset.importing.names import plain, rank_of, shipped_names, tables_of
 from discover.dataset.importing.quantities import QUANTITIES
+from discover.errors import InputError
 
 RATE = [0.5, 2.0, 8.0, 32.0]
 STRESS = [3.0, 6.0, 12.0, 24.0]
@@ -152,3 +153,12 @@ def test_a_number_of_the_interval_is_no_time_though_german_calls_that_intervallz
         assert "step_time" not in tables_of(name)
     for name in ("Intervallzeit", "Interval time", "Segment time"):
         assert "step_time" in tables_of(name)
+
+
+def test_a_size_without_its_phase_is_no_sweep_and_beside_the_moduli_no_news(tmp_path):
+    size = np.hypot(STORAGE, LOSS) / OMEGA
+    names, units = ("ω", "|η*|"), ("rad/s", "Pa s")
+    with pytest.raises(InputError, match=r"\|η\*\| alone does not give G' and G''"):
+        read(tmp_path, lines(names, units, OMEGA, size))
+    whole = lines((*names, "G'", "G''"), (*units, "Pa", "Pa"), OMEGA, size, STORAGE, LOSS)
+    assert not any("not read" in line for line in read(tmp_path, whole).said)

@@ -154,6 +154,14 @@ def test_the_command_writes_page_json_and_equation(data, tmp_path):
     assert "Fits within the noise of" in (out / "report.html").read_text()
     assert (out / "equations.tex").exists()
     assert (out / "figures" / "runs.svg").exists()
+    code = CliRunner().invoke(app, ["export", str(out)])  # with size and range in its header
+    assert code.exit_code == 0, code.output
+    assert "Fits within the noise of" in code.stdout
+    assert "0.5–3 1/s" in code.stdout
+    lines = CliRunner().invoke(app, ["export", str(out), "--format", "rheotool"]).stdout
+    assert "Giesekus" in lines
+    (out / "fit.json").write_text(json.dumps({**written, "equation": None}))
+    assert "cannot be written out" in CliRunner().invoke(app, ["export", str(out)]).stderr
 
 
 def test_a_fit_has_the_answer_of_the_other_commands(fitted):

@@ -12,8 +12,10 @@ MELT = Answer(
     ),
     range=Range(rate_1_s=(0.003, 3.0)),
     expected_error={
-        "sigma12": ExpectedError(0.06, note="cross-validation"),
-        "N1": ExpectedError(missing="not determined", note="model spread 40 % > 20 %"),
+        "sigma12": ExpectedError(0.06, note="2 unseen runs"),
+        "N1": ExpectedError(
+            missing="not determined", note="laws that fit as well differ by 40 %, limit 20 %"
+        ),
     },
     suspects=(Suspect("stress_gain", (Constant("gain_error", -0.11, (-0.36, 0.02)),)),),
     next_test="Repeat one shear run on a second filling.",

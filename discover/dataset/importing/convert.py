@@ -208,7 +208,8 @@ def _read(path: Path, mapping: Mapping) -> _Found:
                 made.notes += readings.notes.values()
                 found.said.append(_summary(where, readings, one, made, columns))
                 before = made
-                known = readings.used.keys() & readings.columns.keys()
+                # what another column says already is known, though it is not used
+                known = (readings.used.keys() | _THROUGH) & readings.columns.keys()
                 read |= {block.columns[readings.columns[k]][0] for k in known}
                 read |= set(block.told_by)
                 there |= dict.fromkeys(readings.numbered())

@@ -29,6 +29,7 @@ _INDEX_COLUMNS = [
 ]  # fmt: skip
 _FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
 _OSCILLATION = (("omega",), ("Gp",), ("Gpp",))
+_SIZES = ("complex_modulus", "complex_viscosity")
 
 
 def files_of(found: Sequence[Record]) -> tuple[dict[str, str], list[str]]:
@@ -167,7 +168,7 @@ def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequenc
     number, best = max(tables, key=lambda pair: len(pair[1].columns))
     line = f"block {number} (numbers from line {best.block.line})"
     where = line if len(tables) > 1 else "its block"
-    swings = {"omega", "Gp", "Gpp"} & set(best.columns) and not best.has("time")
+    swings = {"omega", "Gp", "Gpp", *_SIZES} & set(best.columns) and not best.has("time")
     wanted = _OSCILLATION if swings else _FLOW
     lacks = [keys for keys in wanted if not any(best.has(key) for key in keys)]
     names = list(dict.fromkeys(shown(name) for name, _ in best.block.columns if name))
@@ -176,6 +177,13 @@ def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequenc
         f"{', nor as '.join(' or '.join(keys) for keys in lacks)}. Its columns are "
         f"{', '.join(names[:15])}."
     )
+    if size := next((key for key in _SIZES if swings and key in best.columns), None):
+        name = shown(best.block.columns[best.columns[size]][0])
+        return (
+            f"{text} {name} alone does not give G' and G'': export these, or the phase angle δ or "
+            "tan δ with it. If a column has one of them by another name, say so, as in --column "
+            'phase_angle="its name".'
+        )
     known = [(best.columns[key], key) for key in INSTRUMENT.values() if key in best.columns]
     if known and best.geometry is None:
         raw = ", ".join(f"{best.block.columns[at][0]} is {key}" for at, key in known)

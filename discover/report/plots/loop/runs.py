@@ -71,10 +71,13 @@ def runs_picture(result: LoopResult) -> look.Picture:
             drawing,
             "runs",
             "Measured and predicted, run by run."
+            + _OF_BAND * any(r.band is not None for r in records)
             + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
             + _what_is_drawn(records),
         )
 
+
+_OF_BAND = " Shaded: where 95 % of repeated measurements should lie, noise included."
 
 AS_DECLARED, WITH_EFFECTS = "starting model", "with effects"
 """The two models of a closed loop, as pictures name them."""
