@@ -17,7 +17,7 @@ from discover.protocols import oscillatory_shear, start_up, steady_rates
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 RATES = np.geomspace(0.01, 100.0, 25)
 FREQUENCIES = np.geomspace(0.1, 100.0, 25)
-FEW = ["solvent_viscosity", "giesekus_mobility", "relaxation_mode", "yield_stress"]
+FEW = ["solvent_viscosity", "giesekus_mobility", "yield_stress"]
 
 
 def noisy(values, noise, seed=0):

@@ -127,8 +127,8 @@ class Discrepancy:
     `fitter`, `fit`: a hypothesis with derivatives, and what fitted it. `smallest`: what the least
     effect of the hypothesis takes away over the noise: a discrepancy is as likely of any size up to
     that. `names`: effects and terms that are not in the hypothesis. `log_factor`: log of how many
-    times likelier the records are with a discrepancy than without. `log_evidence`: of the records
-    with one. `members`: the likeliest of the grid.
+    times likelier the records are with a discrepancy than without. `members`: the likeliest of the
+    grid.
     """
 
     def __init__(self, fitter: Fitter, fit: Fit, smallest: float = np.inf):
@@ -159,8 +159,7 @@ class Discrepancy:
             curves += product(CURVES, STIFFNESS, GROWTHS[:1], (False,), (True,))
         self._grid = [_Curve(*one) for one in curves]
         self._kept: dict[float, _Products] = {}
-        self.members, self.log_evidence, without = self._weighed()
-        self.log_factor = self.log_evidence - without
+        self.members, self.log_factor = self._weighed()
 
     def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
         problem = self.fitter.problem
@@ -271,8 +270,7 @@ class Discrepancy:
         shared += LEAST**2
         return np.sqrt(shared / np.mean(shared))
 
-    def _weighed(self) -> tuple[list[Member], float, float]:
-        """Return the likeliest discrepancies, and the log evidence with one and without."""
+    def _weighed(self) -> tuple[list[Member], float]:
         n, own = len(self.fitter.noise.kept), self._priors()
         some, plain = [], []
         for correlation in sorted({0.0, 0.45, 0.75, self.fit.noise.correlation}):
@@ -318,7 +316,7 @@ class Discrepancy:
                     size, stiff, growth, terms[0], which, correlation, log, float(noise), mean, root
                 )
             )
-        return members, total, none
+        return members, total - none
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
         """Return the log prior of each curve.

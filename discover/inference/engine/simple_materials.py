@@ -51,7 +51,7 @@ _RELAXING = {"rate": (MAXWELL, _GOING_ON, TWO_MODES), "oscillation": (MAXWELL, T
 that solid."""
 
 _AHEAD = 3.0
-"""Log evidence by which a yield stress must lead what has none: it is strong from there on
+"""Log evidence by which a yield stress or a modulus must lead what has none: that is strong
 [Kass & Raftery 1995, J. Am. Stat. Assoc. 90, 773]."""
 
 _UNKNOWN = float(np.log(NONE / (1.0 - NONE)))
@@ -230,7 +230,7 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     laws = (*_WEIGHED[control], *((KELVIN_VOIGT,) if from_rest else ()))
     fits = {law: _fitted(fitter, law) for law in (_NO_MATERIAL, *laws)}
     nothing = fits.pop(_NO_MATERIAL)[1].log_evidence
-    lead = {HERSCHEL_BULKLEY: _AHEAD}
+    lead = dict.fromkeys((HERSCHEL_BULKLEY, KELVIN_VOIGT), _AHEAD)
     law = max(fits, key=lambda name: fits[name][1].log_evidence - lead.get(name, 0.0))
     fitted, fit = fits[law]
     rank = fit.log_evidence + problem.log_odds_of(1.0)
@@ -242,9 +242,9 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         return bool(np.sqrt(np.mean(((record - fitted.record(fit)) / noise) ** 2)) < SAME)
 
     if law == KELVIN_VOIGT:
-        relaxing = (_fitted(fitter, name) for name in _RELAXING[control])
-        if any(is_same(own.record(one)) for own, one in relaxing):
-            return None
+        for own, one in (_fitted(fitter, name) for name in _RELAXING[control]):
+            if one.log_evidence > fit.log_evidence or is_same(own.record(one)):
+                return None
     least = _SEEN * np.min(np.abs(fitter.rows.recorded)) if fitted.is_curve else 0.0
     if law == HERSCHEL_BULKLEY and fit.theta[0] < least:
         return None
@@ -252,18 +252,20 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     if alive:
         ranks = [search.rank(one) for one in alive]
         if (left := posterior.left) is not None:
-            ranks.append(left.log_evidence + problem.log_prior(left.fit.names) + _UNKNOWN)
+            ranks.append(search.rank(left.fit) + left.log_factor + _UNKNOWN)
         others = float(np.logaddexp.reduce(ranks))
         others -= _NEAR if is_same(fitter.record(alive[0])) else 0.0
     unknown = rank + Discrepancy(fitted, fit).log_factor + _UNKNOWN
-    if np.logaddexp(rank, unknown) < np.logaddexp(others, nothing):
+    # one that leaves something is told where all that relaxes leaves something too
+    whole = np.logaddexp(rank, unknown) if posterior.verdict == "unexplained" else rank
+    if whole < np.logaddexp(others, nothing):
         return None
     odds = rank - float(np.logaddexp.reduce([others, nothing, unknown]))
     # how sharply a yield stress sets in is as much of the instrument as of the fluid
     sets_in = law == HERSCHEL_BULKLEY and not fitted.is_curve
-    own, onset = (fit.free[:-1], float(fit.theta[-1])) if sets_in else (fit.free, None)
-    values = tuple(float(fit.theta[at]) for at in own)
-    return SimpleFit(law, values, tuple(map(fit.interval, own)), fitted.misfit(fit), odds, onset)
+    free, onset = (fit.free[:-1], float(fit.theta[-1])) if sets_in else (fit.free, None)
+    values = tuple(float(fit.theta[at]) for at in free)
+    return SimpleFit(law, values, tuple(map(fit.interval, free)), fitted.misfit(fit), odds, onset)
 
 
 def _fitted(fitter: Fitter, law: str) -> tuple[_ClosedForm, Fit]:
