@@ -24,6 +24,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import hostile_benches
 import hostile_fluids
 import hostile_noises
 import hostile_records
@@ -67,7 +68,7 @@ def _named(law: str):
 def words() -> dict[str, Any]:
     """Return what the expressions of the file may name."""
     known: dict[str, Any] = {name: getattr(np, name) for name in np.__all__}
-    own = (hostile_fluids, hostile_records, hostile_tests, hostile_noises)
+    own = (hostile_benches, hostile_fluids, hostile_records, hostile_tests, hostile_noises)
     for module in (authors, independent, noise, *own):
         known |= vars(module)
     known |= SAMPLED | {"material": by_name.material, "named": _named, "len": len}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hostile_fluids import PlatePlate
+from hostile_benches import PlatePlate
 from independent import (
     Flow,
     Giesekus,

@@ -88,7 +88,7 @@ _LONG = (
     "test_commands.py", "test_hostile_rules.py", "test_contract_script.py", "test_named_law.py",
     "test_packages_left_out.py", "test_constants_by_mode.py", "test_loop.py", "test_pages.py",
     "test_structure.py", "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
-    "test_comparison.py", "test_estimators.py", "test_rolie_poly_blend.py",
+    "test_estimators.py", "test_rolie_poly_blend.py",
     "test_modulus_errors.py", "test_flows_of_fluids.py", "test_law_choice.py",
 )  # fmt: skip
 

@@ -1,7 +1,6 @@
 """The command line: exit codes, one clear message, resuming, JSON, and programs that are kept."""
 
 import json
-import os
 import subprocess
 import sys
 import time
@@ -15,7 +14,6 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.compilation_cache import enable_compilation_cache, remove_cut_short
-from discover.errors import InputError
 from discover.learners import LearnerResult, RecoveredTerm
 
 STUDY = """
@@ -243,32 +241,6 @@ def test_a_batch_refuses_two_studies_for_one_folder(tmp_path, names):
     assert result.stderr.count("\n") == 1
 
 
-def test_a_study_is_read_once_by_its_command(tmp_path, monkeypatch):
-    from discover.batch import run
-
-    def stop(*arguments):
-        raise InputError("so far")
-
-    known, read = run.read_study, []
-    monkeypatch.setattr(run, "read_study", lambda path: read.append(path) or known(path))
-    monkeypatch.setattr("discover.study.data.read_study", lambda path: pytest.fail("read again"))
-    monkeypatch.setattr(run, "RunFolder", stop)
-    (tmp_path / "s.toml").write_text(STUDY)
-    assert "so far" in invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").stderr
-    assert read == [tmp_path / "s.toml"]
-
-
-@pytest.mark.slow  # where programs are kept is decided at first use (`tests/door/test_import.py`)
-def test_commands_keep_compiled_programs_in_the_users_cache(tmp_path):
-    code = "from discover.cli import main; main()"
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    environment.pop("JAX_COMPILATION_CACHE_DIR", None)
-    command = [sys.executable, "-c", code, "compare", str(tmp_path / "none.toml"), "--out", "x"]
-    done = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, timeout=120)
-    assert done.returncode == 2  # no such study; the cache is made ready before it is read
-    assert (tmp_path / "cache" / "discover" / "compiled").is_dir()
-
-
 def test_nothing_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
     monkeypatch.setenv("DISCOVER_NO_CACHE", "1")
     assert enable_compilation_cache(tmp_path / "compiled") is None
@@ -307,39 +279,6 @@ def test_a_folder_in_place_of_a_study_is_answered_with_a_study(tmp_path):
     meant = CliRunner().invoke(app, ["close-loop", str(tmp_path)])
     assert "Did you mean" in meant.stderr
     assert "melt.toml" in meant.stderr
-
-
-SIMULATE = """
-import sys
-from discover.compilation_cache import enable_compilation_cache
-enable_compilation_cache(sys.argv[1])
-import jax, numpy as np
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import observed_on_grid
-from discover.laws import Fluid, Giesekus
-from discover.protocols import start_up
-flows = lay_out([start_up(2.0)], [np.linspace(0.1, 3.0, 7)])
-def followed(fluid):
-    return flows.over(lambda *flow: observed_on_grid(fluid, *flow))
-jax.jit(followed)(Fluid(Giesekus(0.3), np.ones(1), np.ones(1)))
-"""
-
-
-def start(folder):
-    """What a process says that follows a fluid by JAX, with a cache folder."""
-    command = [sys.executable, "-c", SIMULATE, str(folder)]
-    return subprocess.run(command, check=True, timeout=300, capture_output=True, text=True).stderr
-
-
-@pytest.mark.slow
-def test_a_program_with_a_solver_in_it_is_kept_and_one_cut_short_is_made_again(tmp_path):
-    # a check that calls back to Python would make it one that cannot be kept
-    start(tmp_path)
-    (kept,) = (path for path in tmp_path.iterdir() if "jit_followed" in path.name)
-    whole = kept.read_bytes()
-    kept.write_bytes(whole[: len(whole) // 2])  # as a full disk does, or a kill
-    assert start(tmp_path) == ""
-    assert kept.stat().st_size > 0.9 * len(whole)
 
 
 def test_whole_programs_are_left_and_broken_ones_go(tmp_path):

@@ -19,7 +19,6 @@ FLOWS = {
 }
 HELD_OUT = {"faster_up.csv": (start_up(5.0), 4.0)}
 EFFECTS = ["giesekus_mobility", "stress_gain", "ptt_linear"]
-GAIN = 1.1
 
 
 def asked(tmp_path, material, recorded):

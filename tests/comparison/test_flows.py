@@ -189,15 +189,6 @@ def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
     assert np.mean(knots < 1.0) > 2.0 / 20.0
 
 
-def test_a_rate_that_is_all_noise_is_followed_all_but_sample_by_sample():
-    times = np.linspace(0.0, 1.0, 500)
-    rates = np.random.default_rng(0).normal(size=times.size)
-    knots, followed = followed_rate(times, rates, evenly_chosen(times.size, 50))
-    assert len(knots) > 450
-    apart = np.interp(times, knots, followed) - rates
-    assert np.max(np.abs(apart)) <= 0.05 * np.max(np.abs(rates))
-
-
 def test_a_short_record_is_left_as_it_is():
     data = oscillations(400)
     thinned = thinned_to(data, 400)

@@ -3,22 +3,18 @@
 ``tests/cli/test_malformed_inputs.py`` does the same to all that the command line reads.
 """
 
-import json
 import os
-import random
 
 import numpy as np
 import pytest
-from harm import SANE, TOKENS, mutate_text
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from harm import SANE
 from made_exports import write_files
 from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.dataset import check_folder, load_dataset
 from discover.errors import InputError
-from discover.study import RunFolder, fingerprint, read_study
+from discover.study import fingerprint, read_study
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model
 
@@ -68,64 +64,6 @@ def use(root) -> str | None:
     except InputError as error:
         return str(error)
     return None
-
-
-def assert_clear(message: str, names):
-    """Hold a message to what the user needs: where, in words, and what to do."""
-    assert "Traceback" not in message
-    assert len(message) < 1000, message
-    assert any(name in message for name in names), message
-    assert len(message.split()) >= 4, message
-
-
-NAMES = ["time_s", "time_min", "shear_rate_1_s", "stress_Pa", "stress_kPa", "strain", "N1_Pa", ""]
-cells = st.one_of(
-    st.floats().map(str), st.integers().map(str), st.text(max_size=8), st.sampled_from(TOKENS)
-)
-
-
-@settings(
-    max_examples=25,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
-@given(
-    header=st.lists(st.sampled_from(NAMES), min_size=1, max_size=5),
-    rows=st.lists(st.lists(cells, max_size=5), max_size=6),
-    separator=st.sampled_from([",", ",", ",", ";", "\t"]),
-    end=st.sampled_from(["\n", "\r\n", "\r"]),
-)
-def test_any_table_is_a_run_or_one_message(tmp_path, header, rows, separator, end):
-    text = end.join(separator.join(row) for row in [header, *rows])
-    write(tmp_path, {"a.csv": text.encode("utf-8", "surrogatepass")})
-    message = use(tmp_path)
-    if message is None:
-        run = load_dataset(tmp_path)["a.csv"]
-        assert np.all(np.isfinite(run.stress))
-        assert np.all(np.diff(run.time) > 0)
-    else:
-        assert_clear(message, FILES)
-
-
-@pytest.mark.parametrize("name", ["study.json", "part.json", ".discover-lock"])
-def test_damaged_state_is_never_taken_for_a_result(tmp_path, name):
-    source = random.Random(name)
-    content = {"coefficients": [0.1, 2.0], "rows": {"x": None}}
-    for _ in range(50):
-        folder = RunFolder(tmp_path, "one", overwrite=True)
-        folder.save("part", content)
-        folder._lock.release()
-        target = tmp_path / name if name.startswith(".") else tmp_path / "state" / name
-        text = target.read_text() if target.exists() else json.dumps({"pid": 1, "host": "x"})
-        target.write_bytes(mutate_text(text, source))
-        try:
-            again = RunFolder(tmp_path, "one")
-        except InputError:
-            continue  # taken for another study's: nothing of it is used
-        assert not again.complete
-        assert again.load("part") in (None, content)
-        again._lock.release()
 
 
 HEADER = "time_s,shear_rate_1_s,stress_Pa\n"

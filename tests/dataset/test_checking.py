@@ -11,8 +11,6 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.dataset import check_folder, load_dataset
-from discover.dataset.checking import runs as run_checks
-from discover.dataset.tables import table
 from discover.errors import InputError
 from discover.study import parse_study
 from discover.study.data import load_study_data
@@ -246,17 +244,6 @@ def test_the_clock_column_is_told_when_it_is_not_used(folder):
     assert "clock" in subjects(check_folder(root, "other"), "error")
 
 
-def test_the_column_of_rates_before_is_told(folder):
-    root = folder(start_up())
-    assert "rate_before" not in " ".join(finding.text for finding in check_folder(root))
-    index = (root / "runs.csv").read_text().splitlines()
-    lines = [index[0] + ",shear_rate_before_1_s", *(line + ",5" for line in index[1:])]
-    (root / "runs.csv").write_text("\n".join(lines))
-    notes = [finding.text for finding in check_folder(root) if finding.subject == "start"]
-    assert len(notes) == 1
-    assert 'rate_before = "shear_rate_before_1_s"' in notes[0]
-
-
 def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
     for samples, doubted in ((30, True), (300, False)):
         t = np.linspace(0, 20, samples)
@@ -322,18 +309,3 @@ def test_runs_at_rest_or_without_stress_are_refused_before_any_fit(folder):
     made((flow, stress), (0 * flow, 1e-3 * stress))
     model = declared_model(study, load_study_data(study).dataset)
     assert 0.01 < model.modulus[0] < 100
-
-
-def test_a_check_reads_and_looks_at_each_run_once_however_many_there_are(folder, monkeypatch):
-    read, looked = [], []
-
-    def counted(seen, module, name):
-        known = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda one, *rest: seen.append(one) or known(one, *rest))
-
-    root = folder(*(start_up(rate) for rate in np.geomspace(0.1, 1.0, 12)), sweep=False)
-    counted(read, table, "read_bytes")
-    counted(looked, run_checks, "_half_time")
-    assert not check_folder(root).of("error")
-    assert sorted(path.name for path in read) == sorted(path.name for path in root.glob("*.csv"))
-    assert len(looked) == 12

@@ -128,23 +128,6 @@ def test_an_import_does_not_write_over_the_export_that_it_reads(tmp_path, name, 
     assert {one.name for one in tmp_path.iterdir()} == {name}
 
 
-def test_a_link_to_the_export_is_not_written_over_either(tmp_path):
-    (tmp_path / "raw.csv").write_text("\n".join(SWEEP))
-    (tmp_path / "data").mkdir()
-    (tmp_path / "data" / "lve.csv").symlink_to(tmp_path / "raw.csv")
-    _, result = run(tmp_path, tmp_path / "raw.csv", "--overwrite", code=2)
-    assert "a file that this import reads" in result.stderr
-
-
-def test_a_mapping_that_was_read_stays_as_it_is(tmp_path):
-    out, _ = imported(tmp_path, "a.csv", START)
-    mapping = out / "import.toml"
-    mapping.write_text("# by hand\n" + mapping.read_text())
-    before = mapping.read_bytes()
-    run(tmp_path, "--mapping", mapping, "--overwrite")
-    assert mapping.read_bytes() == before
-
-
 TEMPERATURES = {
     "title": ("a{}.csv", "Result:,Sweep at {} °C", ("20", "60")),
     "line alone": ("a{}.csv", "Sweep at {} K", ("293.15", "333.15")),

@@ -11,7 +11,6 @@ from made_exports import (
     TIMES,
     G,
     assert_softening,
-    assert_sweep,
     imported,
     lines,
     moduli,
@@ -20,14 +19,6 @@ from made_exports import (
 )
 
 from discover.dataset import load_dataset
-
-
-def test_one_table_of_sweeps_over_temperatures_is_several_sweeps(tmp_path):
-    parts = [np.stack([np.full(13, t), OMEGA, *moduli(OMEGA, t / 20)]) for t in (20.0, 40.0)]
-    head = ["Temperature,Frequency,G',G''", "°C,rad/s,Pa,Pa"]
-    out, _ = imported(tmp_path, "a.csv", head + lines(*np.concatenate(parts, 1), mark=","))
-    for degrees in (20, 40):
-        assert_sweep(out / f"lve_{degrees}C.csv", shift=degrees / 20)
 
 
 def test_a_rate_that_alternates_is_not_taken_for_a_strain_without_a_name(tmp_path):

@@ -66,16 +66,6 @@ def test_a_steady_start_takes_its_rate_from_the_column_of_that_name(tmp_path):
     assert [f.subject for f in check_folder(made) if f.severity == "error"] == ["start"]
 
 
-def test_an_empty_rate_before_is_a_start_from_rest_whether_or_not_a_key_names_it(tmp_path):
-    made = folder(tmp_path / "melt", "file,start,rate_before_1_s", "a.csv,steady,5", "b.csv,,")
-    for key in (None, "rate_before_1_s"):
-        assert [run.rate_before for run in load_dataset(made, rate_before=key)] == [5.0, 0.0]
-    (made / "runs.csv").write_text("file,start,rate_before_1_s\na.csv,steady,\nb.csv,,5\n")
-    for key in (None, "rate_before_1_s"):
-        with pytest.raises(InputError, match="line 2 holds nothing"):
-            load_dataset(made, rate_before=key)
-
-
 def test_what_is_said_of_a_rate_before_is_what_is_done_with_it(tmp_path):
     lines = ("a.csv,steady,5", "b.csv,,", "c.csv,,3")
     made = folder(tmp_path / "melt", "file,start,rate_before_1_s", *lines)

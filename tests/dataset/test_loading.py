@@ -86,17 +86,6 @@ def test_a_rate_is_measured_if_it_was_derived_or_the_caller_says_so(folder):
     assert load_dataset(made, rate_is_measured=True)["a.csv"].rate_is_measured
 
 
-def test_the_steady_flow_before_a_run_is_read_from_the_column_that_is_named(folder):
-    made = folder(runs__csv="file,before\na.csv,-0.25\nb.csv,0\n")
-    assert [run.rate_before for run in load_dataset(made, rate_before="before")] == [-0.25, 0.0]
-    assert [run.rate_before for run in load_dataset(made)] == [0.0, 0.0]
-    with pytest.raises(InputError, match="rate_before names the column 'earlier'"):
-        load_dataset(made, rate_before="earlier")
-    bad = folder(runs__csv="file,before\na.csv,slow\nb.csv,0\n")
-    with pytest.raises(InputError, match="finite numbers; line 2 holds slow"):
-        load_dataset(bad, rate_before="before")
-
-
 def test_a_sample_remembers_the_strain_of_earlier_runs(folder):
     index = "file,start\na.csv,20\nb.csv,10\n"
     data = load_dataset(folder(runs__csv=index), sequence="start")

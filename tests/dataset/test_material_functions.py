@@ -150,31 +150,3 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
     assert run.quantity == "strain"
     np.testing.assert_allclose(run.recorded, [0.01, 0.02, 0.11, 0.2])
     assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
-
-
-def test_an_estimator_takes_creep_as_its_strain_and_a_sweep_as_its_moduli(tmp_path):
-    from discover.learners.runs import as_runs
-
-    tables = load_dataset(write_files(tmp_path, TABLES | SWEEPS)).material_functions
-    taken = as_runs([tables["creep"], tables["amplitude_sweep"]])
-    assert [run.quantity for run in taken] == ["strain", "storage_modulus", "loss_modulus"]
-    # a second time nothing changes
-    assert [run.name for run in as_runs(taken)] == [run.name for run in taken]
-
-
-def test_an_estimator_takes_a_flow_curve_as_it_is_and_imposes_a_given_stress(tmp_path):
-    from discover.learners.runs import as_runs
-
-    curve = load_dataset(write_files(tmp_path, TABLES)).material_functions["flow_curve"]
-    (taken,) = as_runs([curve])
-    assert taken.protocol.control == "steady"
-    np.testing.assert_array_equal(taken.stress, curve.stress)
-    times = np.linspace(0.1, 6.0, 60)
-    rows = [f"{t},{np.sin(t)},{1.0 - np.cos(t)}" for t in times]
-    files = {"runs.csv": "file,control\nwave.csv,stress\n"}
-    files["wave.csv"] = "\n".join(["time_s,stress_Pa,strain", *rows])
-    wave = load_dataset(write_files(tmp_path, files))["wave.csv"]
-    (imposed,) = as_runs([wave])
-    # a rate derived from a noisy strain errs smoothly, and that looks like a missing term
-    assert (imposed.protocol.control, imposed.quantity) == ("stress", "strain")
-    np.testing.assert_array_equal(imposed.recorded, wave.strain)

@@ -1,14 +1,18 @@
-"""What stands after the underscore of a heading, and what `data check` says of it."""
+"""Units: what a heading says, what numbers tell, what is asked for, and what a check says of it."""
 
 import math
 
+import numpy as np
 import pytest
-from made_exports import write_files
+from made_exports import columns, csv, write_files
 from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.dataset import check_folder, load_dataset
-from discover.dataset.tables.units import read_heading, read_unit
+from discover.dataset.importing import import_files
+from discover.dataset.importing.mapping import Mapping
+from discover.dataset.importing.text_rows import is_clock, seconds, with_points
+from discover.dataset.tables.units import name_and_unit, read_heading, read_unit
 from discover.errors import InputError
 
 # factor to SI, by hand: 1 dyn = 1e-5 N, 1 psi = 0.45359237 kg · 9.80665 m/s² / (0.0254 m)²
@@ -129,3 +133,201 @@ def test_a_rate_before_in_another_quantitys_unit_is_refused(tmp_path):
     with pytest.raises(InputError, match=words):
         load_dataset(folder, rate_before="rate_before_Pa")
     assert any("has the unit Pa" in str(f) for f in check_folder(folder).of("warning"))
+
+
+TIME = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
+STRESS = np.array([2.0, 3.5, 6.0, 9.0, 11.0, 12.0])
+
+
+def read(folder, text, **known):
+    file = folder / "a.csv"
+    file.write_text(text, "utf-8")
+    return import_files([file], Mapping(**known))
+
+
+def table(**columns):
+    return csv({name: np.asarray(values, float) for name, values in columns.items()})
+
+
+def start_up(time="Time", rate="Shear Rate", stress="Shear Stress", **more):
+    return table(**{time: TIME, rate: np.full(6, 2.0), stress: STRESS, **more})
+
+
+def sweep(strain, extra="", values=None, unit=" (Pa)"):
+    size = np.geomspace(0.1, 1000.0, 12)
+    moduli = {f"G'{unit}": 500.0 / (1 + size / 50), f"G''{unit}": 200.0 / (1 + size / 90)}
+    known = {strain: size, "Angular frequency (rad/s)": np.ones(12), **moduli}
+    return table(**known, **({extra: values(size, *moduli.values())} if values else {}))
+
+
+def test_plain_names_without_units_are_SI_and_one_warning_says_so(tmp_path):
+    made = read(tmp_path, start_up())
+    warnings = [line for line in made.said if line.startswith("warning")]
+    assert len(warnings) == 1
+    for word in ("Time in s", "Shear Rate in 1/s", "Shear Stress in Pa", "--unit"):
+        assert word in warnings[0]
+    np.testing.assert_allclose(columns(made.files["a.csv"])["stress_Pa"], STRESS)
+    given = read(tmp_path, start_up("Time (s)", "Shear Rate (1/s)", "Shear Stress (Pa)"))
+    assert not [line for line in given.said if line.startswith("warning")]
+
+
+def test_all_units_that_only_the_user_knows_are_asked_for_at_once(tmp_path):
+    text = sweep("Strain").replace("Angular frequency (rad/s)", "Frequency")
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    for option in ("strain=%", "strain=1", "omega=Hz", "omega=rad/s"):
+        assert f"--unit {option}" in str(caught.value)
+    made = read(tmp_path, text, units={"strain": "%", "omega": "Hz"})
+    got = columns(made.files["amplitude_sweep.csv"])
+    np.testing.assert_allclose(got["strain"], np.geomspace(1e-3, 10.0, 12))
+    np.testing.assert_allclose(got["omega_rad_s"], 2.0 * np.pi)
+
+
+@pytest.mark.parametrize("heading", ["Strain (%)", "Strain %", "Strain_percent", "Strain in %"])
+def test_per_cent_in_any_heading_is_per_cent(tmp_path, heading):
+    got = columns(read(tmp_path, sweep(heading)).files["amplitude_sweep.csv"])
+    np.testing.assert_allclose(got["strain"], np.geomspace(1e-3, 10.0, 12))
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.01])
+def test_the_stress_of_a_sweep_tells_whether_its_strain_is_in_per_cent(tmp_path, factor):
+    def stress(size, storage, loss):
+        return factor * size * np.hypot(storage, loss)
+
+    made = read(tmp_path, sweep("Strain", "Shear stress (Pa)", stress))
+    got = columns(made.files["amplitude_sweep.csv"])
+    np.testing.assert_allclose(got["strain"], factor * np.geomspace(0.1, 1000.0, 12))
+    assert any("the stress is |G*| times it" in line for line in made.said)
+    with pytest.raises(InputError, match="--unit strain"):  # a stress that fits neither
+        read(tmp_path, sweep("Strain", "Shear stress (Pa)", lambda *v: 7.0 * stress(*v)))
+
+
+def test_the_rate_of_a_run_tells_the_unit_of_its_strain(tmp_path):
+    for strain in (200.0 * TIME, 2.0 * TIME):
+        made = read(tmp_path, start_up(Strain=strain))
+        np.testing.assert_allclose(columns(made.files["a.csv"])["strain"], 2.0 * TIME)
+
+
+def test_complex_viscosity_tells_hertz_from_radians(tmp_path):
+    frequency = np.geomspace(0.1, 10.0, 8)
+    storage, loss = 100.0 * frequency**0.7, 80.0 * frequency**0.6
+    size = np.hypot(storage, loss) / (2.0 * np.pi * frequency)
+    text = table(**{"f": frequency, "G'": storage, "G''": loss, "|η*| (Pa·s)": size})
+    got = columns(read(tmp_path, text).files["lve.csv"])
+    np.testing.assert_allclose(got["omega_rad_s"], 2.0 * np.pi * frequency)
+
+
+def test_a_viscosity_without_a_unit_is_asked_for_only_where_it_stands_for_the_stress(tmp_path):
+    rate = np.geomspace(1.0, 100.0, 6)
+    thin = {"Shear rate (1/s)": rate, "Viscosity": STRESS / rate}
+    with pytest.raises(InputError, match="--unit viscosity=mPa\\*s or --unit viscosity=Pa\\*s"):
+        read(tmp_path, table(**thin))
+    got = columns(read(tmp_path, table(**thin, Stress=STRESS)).files["flow_curve.csv"])
+    np.testing.assert_allclose(got["stress_Pa"], STRESS)
+
+
+def test_a_capital_T_without_a_unit_is_a_temperature_and_no_time(tmp_path):
+    rate = np.geomspace(1.0, 100.0, 6)
+    text = table(T=np.full(6, 25.0), **{"Shear rate": rate, "Stress": STRESS})
+    assert "flow_curve.csv" in read(tmp_path, text).files
+    assert "a.csv" in read(tmp_path, start_up("t")).files
+
+
+def test_a_table_of_this_projects_own_needs_no_unit_of_strain(tmp_path):
+    text = table(time_s=TIME, strain=2.0 * TIME, stress_Pa=STRESS)
+    np.testing.assert_allclose(columns(read(tmp_path, text).files["a.csv"])["strain"], 2.0 * TIME)
+
+
+def test_a_sweep_of_frequency_does_not_ask_for_a_strain_that_it_does_not_use(tmp_path):
+    omega = np.geomspace(0.1, 10.0, 8)
+    known = {"Angular frequency (rad/s)": omega, "G' (Pa)": omega, "G'' (Pa)": omega}
+    text = table(Strain=np.full(8, 0.5), **known)
+    assert "lve.csv" in read(tmp_path, text).files
+
+
+def test_a_unit_that_changes_nothing_is_named(tmp_path):
+    with pytest.raises(InputError, match="--unit torque changes nothing"):
+        read(tmp_path, start_up(), units={"torque": "mN*m"})
+    thick = {"Viscosity": STRESS / 2.0}
+    made = read(tmp_path, start_up(**thick), units={"viscosity": "cP"})
+    assert any("--unit viscosity changes nothing" in line for line in made.said)
+    # the strain of a sweep may be called by either name
+    for key in ("strain", "strain_amplitude"):
+        made = read(tmp_path, sweep("Strain"), units={key: "%"})
+        assert columns(made.files["amplitude_sweep.csv"])["strain"][-1] == pytest.approx(10.0)
+
+
+def test_units_in_lines_above_the_numbers_are_used_and_the_time_of_day_is_none(tmp_path):
+    above = "Time: 12:15:24\nDate: 2024-01-05\nShear Stress Unit: dyn/cm^2\n\n"
+    made = read(tmp_path, above + start_up("Elapsed Time", "S. Rate", "S. Stress"))
+    np.testing.assert_allclose(columns(made.files["a.csv"])["stress_Pa"], 0.1 * STRESS)
+
+
+@pytest.mark.parametrize(
+    ("cells", "wanted"),
+    [
+        (["00:00:02", "00:01:04.5"], [2.0, 64.5]),
+        (["0:30", "1:00,5", "59:59", "1:00:00"], [30.0, 60.5, 3599.0, 3600.0]),
+        (["12:15:24", "12:15:26"], [0.0, 2.0]),
+        (["23:59:58", "00:00:02"], [0.0, 4.0]),
+        (["2024-01-05 12:15:24.5", "2024-01-05T12:15:26"], [0.0, 1.5]),
+        (["31.01.2024 23:59:59", "01.02.2024 00:00:01"], [0.0, 2.0]),
+        (["1/31/2024 11:59:59 AM", "1/31/2024 12:00:01 PM"], [0.0, 2.0]),
+        (["1 day, 0:00:02", "1 day, 0:00:05"], [0.0, 3.0]),
+    ],
+)
+def test_clock_times_become_seconds(cells, wanted):
+    assert all(map(is_clock, cells))
+    np.testing.assert_allclose(seconds(cells), wanted, atol=1e-6)  # a stamp has digits of 1e-7 s
+
+
+def test_a_run_with_a_clock_is_a_run(tmp_path):
+    stamps = [f"00:00:{t:02d}" for t in range(2, 14, 2)]
+    rows = "".join(f"{t},10.0,{s}\n" for t, s in zip(stamps, STRESS, strict=True))
+    made = read(tmp_path, "Elapsed Time,Shear Rate,Shear Stress\n(hh:mm:ss),(1/s),(Pa)\n" + rows)
+    np.testing.assert_allclose(columns(made.files["a.csv"])["time_s"], np.arange(2.0, 14.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("τ [Pa]", "τ", "Pa"), ("τ (Pa)", "τ", "Pa"), ("τ in Pa", "τ", "Pa"),
+        ("粘度（ｍＰａ・ｓ）", "粘度", "ｍＰａ・ｓ"), ("Rate (s^(-1))", "Rate", "s^(-1)"),
+        ("G(t) [Pa]", "G(t)", "Pa"), ("tan(delta)", "tan(delta)", ""),
+        ("Time (action)", "Time (action)", ""),
+    ],
+)  # fmt: skip
+def test_a_unit_is_taken_off_a_heading(heading, name, unit):
+    assert name_and_unit(heading, "") == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("texts", "factor"),
+    [
+        ("1/s|s⁻¹|s^-1|s-1|s^{-1}|/s|1/sec|１／ｓ|1/с|с⁻¹", 1.0),
+        ("mPa·s|mPa s|mPas|mPa.s|mPa-s|mPa・s|cP|мПа·с|ｍＰａ・ｓ", 1e-3),
+        ("dyn/cm²|dyn/cm^2|Dyne/cm2|dynes/cm^2", 0.1),
+        ("min|Min|分|мин|분", 60.0),
+        ("°|deg|度|Grad", np.pi / 180.0),
+        ("㎪|kPa|ｋＰａ|кПа", 1e3),
+    ],
+)
+def test_units_are_read_in_every_writing(texts, factor):
+    for text in texts.split("|"):
+        unit = read_unit(text)
+        assert unit is not None, text
+        assert unit.factor == pytest.approx(factor, rel=1e-12), text
+
+
+@pytest.mark.parametrize(
+    ("cells", "wanted"),
+    [
+        ("1.234,5|12,3|2.000", "1234.5|12.3|2000"),
+        ("1,234.5|12.3|2,000", "1234.5|12.3|2000"),
+        ("1 234,5|−1,5|1\u202f234", "1234.5|-1.5|1234"),
+        ("1'234.5|１２.５|0.123", "1234.5|12.5|0.123"),
+        ("0,5|0,123|12,75", "0.5|0.123|12.75"),
+    ],
+)
+def test_numbers_of_every_country_have_points_in_the_end(cells, wanted):
+    assert with_points([cells.split("|")], "a.txt") == [wanted.split("|")]

@@ -24,11 +24,6 @@ def export(tmp_path, columns, *above, code=0, name="a.csv", options=()):
     return imported(tmp_path, name, rows, *options, code=code)
 
 
-def block(title, **columns):
-    names = {"t": "Time [s]", "stress": "Stress [Pa]", "strain": "Strain [-]"}
-    return [title, ",".join(names[key] for key in columns), *lines(*columns.values(), mark=","), ""]
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_a_creep_that_is_exported_with_its_rate_is_a_run_at_given_stress(tmp_path, noise):
     scatter = 1.0 + noise * np.random.default_rng(2).standard_normal(30)

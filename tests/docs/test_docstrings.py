@@ -1,11 +1,17 @@
-"""Every public name says what it takes: each parameter, and of arrays the shape and the unit."""
+"""Documentation: docstrings say shapes and units, the site's links lead somewhere."""
 
 import inspect
 import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
 import discover
+import discover as dc
 import tensor_library
 
 UNITS = re.compile(r"\b(Pa|s|1/s|rad|rad/s|°C|[Dd]imensionless|number|[Ss]train)\b|σ|γ̇")
@@ -87,3 +93,101 @@ def test_what_says_nothing_is_found():
 
     assert silent_about(mute) == ["first", "second", "third"]
     assert without_shape_or_unit(vague) == ["values"]
+
+
+ROOT = Path(__file__).parents[2]
+
+
+class Page(HTMLParser):
+    """What a page loads, where its links lead, and the places in it."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.loaded, self.links, self.places = [], [], set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.places |= {values[key] for key in ("id", "name") if values.get(key)}
+        if tag == "a" and values.get("href"):
+            self.links.append(values["href"])
+        elif tag in ("script", "img", "iframe") and values.get("src"):
+            self.loaded.append(values["src"])
+        elif tag == "link" and values.get("rel") in ("stylesheet", "icon", "preload", "prefetch"):
+            self.loaded.append(values["href"])
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    for name in ("material", "mkdocstrings", "nbconvert"):
+        pytest.importorskip(name)
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "-q", "-d", str(folder)]
+    subprocess.run(command, cwd=ROOT, check=True)  # strict: a warning is an error
+    pages = {path: Page(path.read_text("utf-8")) for path in folder.rglob("*.html")}
+    pages.pop(folder / "404.html")  # written for the root of a server
+    return pages
+
+
+def dead_links(pages):
+    """Return the links within the site that lead to no file, or to no place in it."""
+    dead = []
+    for path, page in pages.items():
+        for link in page.links + page.loaded:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            place = unquote(parts.fragment)
+            in_page = target in pages and place and place not in pages[target].places
+            if not target.is_file() or (in_page and not place.startswith("__")):
+                dead.append((path.name, link))
+    return dead
+
+
+def test_every_link_of_the_site_leads_somewhere(site):
+    assert len(site) > 30
+    assert not dead_links(site)
+
+
+def test_a_link_to_nowhere_is_seen(tmp_path):
+    # control of the test above
+    path = tmp_path / "a.html"
+    path.write_text('<a href="b.html">b</a> <a href="#there">c</a> <p id="here"></p>')
+    assert len(dead_links({path: Page(path.read_text())})) == 2
+
+
+def test_the_site_loads_nothing_from_a_network(site):
+    for path, page in site.items():
+        assert not [source for source in page.loaded if "//" in source], path.name
+
+
+def test_every_public_name_is_in_the_reference(site):
+    places = set().union(*(page.places for page in site.values()))
+    tables = {
+        "laws": "discover.laws.registry.laws_table",
+        "effects": "discover.effects.registry.effects_table",
+    }
+    for name in dc.__all__:
+        assert tables.get(name, f"discover.{name}") in places, name
+    for name in tensor_library.__all__:
+        assert f"tensor_library.{name}" in places, name
+
+
+def test_methods_and_results_that_users_hold_are_in_the_reference(site):
+    places = set().union(*(page.places for page in site.values()))
+    for learner in ("TensorSINDy", "TBNNUDE"):
+        for method in ("fit", "predict", "score", "save", "equation_"):
+            assert f"discover.{learner}.{method}" in places
+    for method in ("to_html", "to_dataframe", "to_json", "errors_table"):
+        assert f"discover.comparison.comparison.Comparison.{method}" in places
+        assert f"discover.loop.loop_result.LoopResult.{method}" in places
+    assert "discover.equations.Equation.latex" in places
+
+
+def test_formulas_are_set_and_search_knows_them_by_name(site):
+    (effects,) = [path for path in site if path.name == "effects.html"]
+    text = effects.read_text("utf-8")
+    assert text.count("<math") > 20
+    assert not re.search(r'class="arithmatex">\\', text)
+    assert "giesekus_mobility" in (effects.parent / "search/search_index.js").read_text("utf-8")

@@ -1,9 +1,11 @@
-"""Fitted estimators survive every way out of a process, and take a fluid as their base."""
+"""Fitted estimators survive every way out of a process, and files of them run nothing."""
 
 import copy
 import gzip
 import json
+import os
 import pickle
+import resource
 import subprocess
 import sys
 import zipfile
@@ -19,7 +21,7 @@ from sklearn.model_selection import cross_validate
 import discover as dc
 from discover.laws import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files import provenance_of
+from discover.learners.files import FORMAT, VERSION, provenance_of
 from tensor_library import parse_term
 from tensor_library.library import TermLibrary
 
@@ -234,3 +236,47 @@ def test_cross_validation_in_two_processes_equals_that_in_one(data, base, monkey
     for one, other in zip(serial["estimator"], parallel["estimator"], strict=True):
         assert other.fluid_.modulus.dtype == np.float64
         np.testing.assert_allclose(other.coefficients_, one.coefficients_, rtol=1e-12)
+
+
+def holding(dtype, shape, numbers=(1.0,)):
+    array = {"kind": "array", "dtype": dtype, "shape": shape, "numbers": list(numbers)}
+    return json.dumps(
+        {"format": FORMAT, "version": VERSION, "learner": "tensor_sindy",
+         "parameters": {"modulus": array}, "fitted": {}}
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        " " * 300_000_000,  # 300 MB in a third of one
+        "[" * 2_000_000,
+        "[" + "{}," * 1_000_001,
+        "[" * 100_000 + "]" * 100_000,
+        holding("<f8", [10**12]),
+        holding("<f8", [2**40, 2**40]),
+        holding("|O", [1]),
+        holding("<U999999999", [1]),
+        holding("<i8", [1], [10**400]),
+        holding("no type", [1]),
+    ],
+    ids=["swelling", "long", "many", "deep", "large", "overflowing", "objects", "text", "huge",
+         "no type"],
+)  # fmt: skip
+def test_a_file_that_would_fill_the_memory_or_run_something_is_refused(content, tmp_path):
+    path = tmp_path / "law.discover"
+    path.write_bytes(gzip.compress(content.encode(), 1))
+    del content
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(dc.InputError, match="is damaged"):
+        dc.load(path)
+    # kilobytes: no more than the limit of 2^28 bytes is unpacked
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
+
+
+def test_a_pipe_or_a_device_is_no_file(tmp_path):
+    pipe = tmp_path / "law.discover"
+    os.mkfifo(pipe)
+    for path in (pipe, "/dev/zero", tmp_path):
+        with pytest.raises(dc.InputError, match=r"pipe or device|folder"):
+            dc.load(path)

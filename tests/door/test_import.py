@@ -14,10 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import discover as dc
 from discover import linear_algebra_threads
 from discover.accelerators import use_the_processor_from_the_start
-from discover.comparison import run_comparison
-from discover.learners.run_prediction import RunPrediction
 from discover.linear_algebra_threads import in_one_thread, use_one_thread_from_the_start
-from discover.loop import loop
 
 HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "equinox")
 
@@ -149,26 +146,6 @@ def test_arrays_of_single_precision_are_an_error_and_without_them_a_first_call_w
     assert (level, error) == ("CRITICAL", "")
 
 
-# XLA raises an alarm where it takes more than a second to compute a constant
-SLOW = """
-import discover as dc
-dc.Fluid
-import jax, jax.numpy as jnp
-def constant():
-    ones = jnp.ones((60, 60))
-    return jax.lax.reduce_window(ones, 0.0, jax.lax.add, (25, 25), (1, 1), "SAME")
-jax.jit(constant)().block_until_ready()
-"""
-
-
-@pytest.mark.slow
-def test_an_alarm_of_xla_is_heard_by_those_alone_who_ask_for_it():
-    assert python(SLOW, DISCOVER_NO_CACHE="1") == ("", "")
-    # negative control: XLA had something to say
-    loud = python(SLOW, DISCOVER_NO_CACHE="1", TF_CPP_MIN_LOG_LEVEL="0")
-    assert "Constant folding" in loud[1]
-
-
 COMMAND = f"""
 import atexit, os, runpy, sys
 sys.argv = ["discover", "--help"]
@@ -245,11 +222,6 @@ def test_a_fit_runs_in_one_thread(monkeypatch):
     run = dc.synthetic_dataset("ucm", noise=0.01)[0]
     dc.TensorSINDy(base=dc.Fluid(dc.make_law("ucm"), 1.0, 1.0)).fit([run])
     assert seen == [{1}]
-
-
-@pytest.mark.parametrize("function", [loop.run_loop, run_comparison.compare, RunPrediction.fit])
-def test_what_fits_many_times_is_limited(function):
-    assert hasattr(function, "__wrapped__")
 
 
 def test_simulate_is_a_function_and_a_package():

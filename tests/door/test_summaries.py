@@ -6,12 +6,8 @@ import pytest
 from scipy.stats import norm
 
 import discover as dc
-from discover.comparison.comparison import Comparison
-from discover.fitting import NamedLawFit
 from discover.learners.results import RecoveredTerm, estimates_of
-from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import default_library
-from discover.loop.loop_result import LoopResult
 from discover.statistics import LackOfFit
 from discover.study import parse_study
 from discover.summary_view import Estimate, SummaryView
@@ -88,13 +84,6 @@ def test_equation_table_and_json_give_a_term_one_sign(wrong):
     _, _, right = latex.partition(" = ")
     assert right == r"\dot{\boldsymbol{\gamma}}"
     assert wrong.equation_.terms[[t.term for t in wrong.terms_].index(term.term)] == term.in_law
-
-
-@pytest.mark.parametrize("result", [NamedLawFit, LoopResult, Comparison, RunPrediction])
-def test_all_results_have_them_by_one_mechanism(result):
-    assert issubclass(result, SummaryView)
-    for name in ("summary", "conf_int", "plot"):
-        assert getattr(result, name) is getattr(SummaryView, name)
 
 
 def test_intervals_of_other_levels_are_those_of_a_normal_distribution():

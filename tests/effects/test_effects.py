@@ -221,12 +221,6 @@ def test_a_delay_shifts_the_record():
     assert float(delayed[0]) == 0.0
 
 
-def test_inertia_adds_the_slope_of_the_rate():
-    added = make_effect("instrument_inertia").recorded_stress(jnp.array([3.0]), record()) - SIGNAL
-    # central differences of step 0.05: error below h^2/6
-    np.testing.assert_allclose(added[1:-1], -3.0 * jnp.sin(TIMES[1:-1]), atol=3.0 * 0.05**2)
-
-
 def test_inertia_grows_as_the_square_of_frequency_in_phase_with_the_strains_acceleration():
     inertia = make_effect("instrument_inertia")
 
@@ -255,13 +249,6 @@ def test_an_edge_is_whole_up_to_the_critical_strain_and_then_loses_its_share_wit
     ratio = make_effect("edge_fracture").recorded_stress(jnp.array([0.3, 3.0]), steady) / SIGNAL
     strain = 2.0 * TIMES
     np.testing.assert_allclose(ratio, jnp.exp(-0.3 * jnp.maximum(strain - 3.0, 0)), rtol=1e-12)
-
-
-def test_below_yield_nothing_relaxes_and_far_beyond_it_all_does():
-    effect = make_effect("yield_stress")
-    np.testing.assert_allclose(effect.extra_term(jnp.array([5.0]), STRESS, RATE), -STRESS)
-    large = effect.extra_term(jnp.array([5.0]), 1e6 * STRESS, RATE)
-    assert np.max(np.abs(large)) < 1e-4 * np.max(np.abs(1e6 * STRESS))
 
 
 def test_any_library_term_is_an_effect_and_an_unknown_name_is_refused():
@@ -294,11 +281,8 @@ def test_an_effect_has_the_values_that_were_written_and_the_rest_to_be_fitted():
     assert known.values == (None, 3.0)
     assert known.free == ("loss",)
     assert "to be fitted" in known.text
-
-
-def test_fit_alone_leaves_every_parameter_to_be_fitted():
-    (known,) = known_effects({"stress_gain": "fit"})
-    assert known.values == (None,)
+    (every,) = known_effects({"stress_gain": "fit"})
+    assert every.values == (None,)
 
 
 @pytest.mark.parametrize(

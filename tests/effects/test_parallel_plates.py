@@ -12,6 +12,7 @@ from independent import Giesekus, PhanThienTanner
 from independent.flow import Flow, oscillation, start_up
 from independent.folders import write_folder
 from independent.instruments import Instrument
+from vectors import vector_of
 
 import discover as dc
 from discover.effects import make_effect
@@ -74,9 +75,7 @@ def test_torque_is_that_of_twelve_radii(flow, protocol):
     run = dc.Run("plates", times, protocol, rate, expected)
     effects = [make_effect(n) for n in ("giesekus_mobility", "parallel_plates", "stress_offset")]
     model = AugmentedModel(DeclaredModel.maxwell([MODULUS], [TIME]), effects)
-    theta = model.zero()
-    for name, value in {"giesekus_mobility": 0.3, "parallel_plates": 1.0}.items():
-        theta[model.positions(name)[0]] = value
+    theta = vector_of(model, giesekus_mobility=0.3, parallel_plates=1.0)
     batch = make_batch([run])
     found = model.predict(theta, batch)[0, : len(times)]
     # Radau's rule with four nodes, of a stress over the rate that falls to a third

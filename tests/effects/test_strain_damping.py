@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from independent import KBKZ, Giesekus, start_up, steps
+from vectors import vector_of
 
 import discover as dc
 from discover.dataset import Run
@@ -28,8 +29,7 @@ TIMES = np.linspace(0.1, 7.0, 60)
 def test_where_no_flow_turns_damping_by_strain_is_wagners_law(protocol, flow):
     declared = DeclaredModel.named("ucm", {}, MODULUS, TIME)
     model = AugmentedModel(declared, [make_effect("strain_damping")])
-    theta = model.zero()
-    theta[model.positions("strain_damping")] = [DAMPING]
+    theta = vector_of(model, strain_damping=DAMPING)
     stress = INTEGRAL.respond(flow, TIMES).sigma12
     run = Run("run", TIMES, protocol, shear_rates(protocol, TIMES), stress)
     ours = model.predict(theta, make_batch([run], strain_step=0.02))[0]

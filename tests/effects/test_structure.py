@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from independent import Giesekus, Structured, Thixotropic, UpperConvectedMaxwell, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
+from vectors import sweep_of, vector_of
 
 from discover import protocols
 from discover.dataset import Dataset, Run
@@ -84,19 +85,6 @@ def test_a_structure_is_that_of_full_tensors_in_shear_and_extension(name):
         assert np.max(np.abs(plain - record)) > 0.2 * np.max(np.abs(record))
 
 
-@pytest.mark.slow
-def test_the_error_of_a_structure_falls_as_the_square_of_the_step():
-    # a power of the rate that is smooth where the flow turns
-    name, exponent = "thixotropic_relaxation", 2.0
-    truth = independent_of(name, exponent=exponent).respond(oscillation(*SWING), TIMES).sigma12
-    errors = [
-        np.linalg.norm(predicted(RUNS[1:2], name, step=step, exponent=exponent)[0] - truth)
-        for step in (0.2, 0.05)
-    ]
-    # three and nine steps from sample to sample: of second order, a factor of 9
-    assert errors[0] / errors[1] == pytest.approx(9.0, rel=0.3)
-
-
 def test_times_a_hundred_times_shorter_need_no_shorter_steps():
     # rates of 4 and 0.3 1/s over a critical one of 1e-4: times fall to 1/600 and 1/120
     name, critical = "thixotropic_relaxation", 1e-4
@@ -126,25 +114,6 @@ def test_a_steady_flow_has_the_structure_of_crosss_equation(name):
     np.testing.assert_allclose(found, truth, rtol=1e-6)
 
 
-def alternating(law, cycles=40):
-    period = 2.0 * np.pi / SWING[1]
-    within = np.linspace(0.0, period, 33)
-    times = np.append(0.0, cycles * period + within)
-    return within, law.respond(oscillation(*SWING), times).sigma12[1:]
-
-
-@pytest.mark.slow
-def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
-    name = "thixotropic_relaxation_two_times"
-    times, truth = alternating(independent_of(name))
-    rate = protocols.oscillatory_shear(*SWING)
-    flow = protocols.after_alternation(rate, times[-1], times)
-    run = Run("on", times, flow, protocols.shear_rates(rate, times), np.ones(len(times)))
-    # of second order in the step, as above; 40 cycles are ten slow build-up times
-    found = predicted([run], name, model=ALONE)[0]
-    np.testing.assert_allclose(found, truth, atol=5e-3 * np.max(truth))
-
-
 @pytest.mark.parametrize("build_up", [0.1, 10.0, 100.0])
 def test_the_state_in_steady_alternation_is_found_however_slowly_a_structure_builds_up(build_up):
     name, (amplitude, frequency) = "thixotropic_relaxation_two_times", SWING
@@ -155,8 +124,7 @@ def test_the_state_in_steady_alternation_is_found_however_slowly_a_structure_bui
         for more in (0.1, 1.0, 7.0)
         for rate in [protocols.oscillatory_shear(more * amplitude, frequency)]
     ]  # fmt: skip
-    theta = ALONE.zero()
-    theta[ALONE.positions(name)] = 1.0 / RATE, build_up, SLOWNESS, SHARE
+    theta = vector_of(ALONE, **{name: (1.0 / RATE, build_up, SLOWNESS, SHARE)})
     found = ALONE.predict(theta, make_batch(runs, strain_step=0.1))
     # a cycle brings the record back, but for errors of second order in steps that are not the same
     # in the record as before: 1e-4 was measured
@@ -168,11 +136,7 @@ def test_moduli_of_two_structures_are_those_that_scipy_ends_at():
     name = "thixotropic_relaxation_two_times"
     law, (amplitude, frequency) = independent_of(name), SWING
     strain = np.array([amplitude / frequency])
-    run = Run(
-        "sweep", np.ones(1), protocols.oscillations(strain, np.array([frequency])),
-        strain * frequency, np.ones(1), strain=strain, storage_modulus=np.ones(1),
-        loss_modulus=np.ones(1),
-    )  # fmt: skip
+    run = sweep_of(strain, np.array([frequency]))
     storage, loss = predicted(run.records, name, model=ALONE)[:, 0]
 
     def change(t, state):
@@ -185,8 +149,7 @@ def test_moduli_of_two_structures_are_those_that_scipy_ends_at():
 
 def test_with_a_power_of_one_the_modulus_follows_moores_equation():
     moore = AugmentedModel(GIESEKUS, [make_effect("thixotropy")])
-    theta = moore.zero()
-    theta[moore.positions("thixotropy")] = 1.0 / (RATE * BUILD_UP), BUILD_UP
+    theta = vector_of(moore, thixotropy=(1.0 / (RATE * BUILD_UP), BUILD_UP))
     name = "thixotropic_modulus"
     ours = predicted(RUNS, name, exponent=1.0)
     # the same sums in another order

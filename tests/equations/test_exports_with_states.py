@@ -5,12 +5,11 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import sympy
 from independent import Giesekus, Structured, Thixotropic
 from independent.homogeneous import UNIT
 from readers import followed, in_ufl, module_of, shear_quantities, ufl_number
 
-from discover.effects import StateEffect, make_effect, named_effects
+from discover.effects import make_effect
 from discover.equations import (
     Box,
     Equation,
@@ -56,7 +55,7 @@ CASES = {
         Structured(2.0, (2.0, 10.0), 2.0 / 3.0, 0.3, **SCALE),
     ),
 }
-HEAT = {"heating": 1e-6, "heat_loss_time": 3.0}
+HEAT = 1e-6, 3.0
 named = pytest.mark.parametrize("name", CASES)
 
 
@@ -196,34 +195,10 @@ def test_latex_has_the_equation_of_the_state_and_its_numbers(name):
     assert effect.equation in equation_of(name, values).latex()
 
 
-STATES = [name for name, e in named_effects().items() if isinstance(e, StateEffect)]
-
-
-@pytest.mark.parametrize("name", STATES)
-def test_what_is_written_is_what_is_integrated(name):
-    effect = make_effect(name)
-    written, generator = effect.written(), np.random.default_rng(3)
-    for _ in range(5):
-        values = generator.uniform(0.1, 0.9, len(effect.parameters))
-        rate, stress = generator.uniform(0.1, 3.0, 2)
-        levels = generator.uniform(0.1, 1.0, effect.levels)
-        state = jnp.asarray(levels if effect.levels > 1 else levels[0])
-        told = dict(zip((p.name for p in effect.parameters), values, strict=True))
-        told |= dict(zip(effect.level_names, levels, strict=True))
-        told |= {"shear_rate": rate, "shear_stress": stress}
-        at = {sympy.Symbol(key, real=True): value for key, value in told.items()}
-        source, decay = effect.source_and_decay(jnp.asarray(values), rate, stress)
-        wanted = np.atleast_1d(source - decay * state)
-        found = [float(one.subs(at)) for one in written.rates]
-        np.testing.assert_allclose(found, wanted, rtol=1e-10)
-        for factor in ("modulus_factor", "time_factor"):
-            own = float(sympy.sympify(getattr(written, factor)).subs(at))
-            exact = float(getattr(effect, factor)(jnp.asarray(values), state))
-            assert own == pytest.approx(exact, rel=1e-12)
-
-
-def test_two_states_at_once_multiply():
-    both = (StatePart("thixotropy", CASES["thixotropy"][0]), StatePart("viscous_heating", HEAT))
+@pytest.mark.parametrize("warmed", ["viscous_heating", "softening_by_work"])
+def test_two_states_at_once_multiply(warmed):
+    constants = dict(zip((p.name for p in make_effect(warmed).parameters), HEAT, strict=True))
+    both = (StatePart("thixotropy", CASES["thixotropy"][0]), StatePart(warmed, constants))
     module = module_of(write_equation(Equation((), (MODULUS,), (TIME,), states=both), "python"))
     assert module["structure_factors"](np.array([0.5, 0.2])) == pytest.approx((0.5, np.exp(-0.2)))
     stress, gradient = MODULUS * np.ones((1, 3, 3)), UNIT["shear"]

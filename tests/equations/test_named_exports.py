@@ -13,6 +13,7 @@ import pytest
 from independent import PomPom, authors
 from independent.homogeneous import UNIT
 from readers import (
+    by_json,
     by_python,
     by_rheotool,
     by_sympy,
@@ -132,6 +133,43 @@ def test_every_text_flows_as_the_law_in_shear_and_in_extension(name):
             assert np.max(np.abs(stress - wanted)) < allowed * scale, form
 
 
+SOLVENT, TOGETHER = 2.5, {"epsilon": 0.2, "xi": 0.15}
+TERMS = (
+    LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * TOGETHER["xi"]),
+    LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": TOGETHER["epsilon"]}),
+)
+# the rates of a mode, and the solvent's viscosity
+READERS = {
+    "python": (by_python, lambda text: module_of(text)["SOLVENT_VISCOSITY_PA_S"]),
+    "sympy": (by_sympy, lambda text: module_of(text)["solvent_viscosity_Pa_s"]),
+    "json": (by_json, lambda text: json.loads(text)["solvent_viscosity_Pa_s"]),
+}
+
+
+@pytest.mark.parametrize("form", [*READERS, "rheotool"])
+def test_a_sum_of_terms_flows_as_its_law_in_every_mode_and_in_the_solvent(form):
+    text = write_equation(Equation(TERMS, MODULUS, TIME, True, SOLVENT), form)
+    # shear and extension at once, so that fewer components stay zero
+    gradient = sum(GRADIENTS.values())
+    rate = gradient + gradient.T
+    if form == "rheotool":
+        found = by_rheotool(text, gradient, TIMES)
+    else:
+        rates, solvent = READERS[form]
+        found = integrated(rates(text), gradient, TIMES) + solvent(text) * rate
+
+    def off(**constants):
+        law = authors.ptt_exponential_non_affine
+        modes = zip(MODULUS, TIME, strict=True)
+        stress = sum(g * authors.stress(law, constants, gradient, TIMES, t) for g, t in modes)
+        wanted = stress + SOLVENT * rate
+        return np.max(np.abs(found - wanted)) / np.max(np.abs(wanted))
+
+    assert off(**TOGETHER) < 1e-5
+    # negative control: a slip parameter that is a tenth off shows
+    assert off(**TOGETHER | {"xi": 1.1 * TOGETHER["xi"]}) > 1e-3
+
+
 def test_constants_that_are_exchanged_between_modes_would_show():
     """Negative control of the test above."""
     other = equation("xpp", CONSTANTS["xpp"][::-1])
@@ -178,6 +216,8 @@ def test_latex_says_the_law_and_has_the_constants_of_each_mode(name):
     )
     for k, constants in enumerate(CONSTANTS[name]):
         numbers = [entry.split("&=") for entry in modes[k].split(r"\\")[0].split(", & ")]
+        scale = [float(right.partition(r"\,")[0]) for _, right in numbers[:2]]
+        assert scale == [MODULUS[k], TIME[k]]
         own = {
             read_latex(left.strip().replace(f"_{{{k + 1}}}", "")).name: float(right)
             for left, right in numbers[2:]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from in_continuous_time import ContinuousFluid
 from scipy.integrate import solve_ivp
+from vectors import vector_of, vectors_of_each
 
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -43,13 +44,6 @@ def model():
     return AugmentedModel(declared, [make_effect(name) for name in NAMES])
 
 
-def vectors(model, names=NAMES):
-    found = [model.zero() for _ in range(1 + len(names))]
-    for theta, name in zip(found[1:], names, strict=True):
-        theta[model.positions(name)] = model.first_trial[model.positions(name)]
-    return np.array(found)
-
-
 def by_scipy(kind):
     """Return strain, N1 and N2: what the solvent is left with decides the rate."""
     unit, trouton = GRADIENTS[kind], {"shear": 1.0, "uniaxial": 3.0}[kind]
@@ -82,10 +76,8 @@ def by_scipy(kind):
 
 
 def test_strains_and_normal_stresses_are_those_of_full_tensors(model):
-    batch, mobility = make_batch(RUNS), model.positions("giesekus_mobility")[0]
-    right, other = model.zero(), model.zero()
-    right[mobility], other[mobility] = MOBILITY, 0.5 * MOBILITY
-    found, wrong = model.observables([right, other], batch)
+    thetas = [vector_of(model, giesekus_mobility=share * MOBILITY) for share in (1.0, 0.5)]
+    found, wrong = model.observables(thetas, make_batch(RUNS))
     for own, off, kind in zip(found, wrong, GRADIENTS, strict=True):
         expected = by_scipy(kind)
         largest = np.maximum(np.max(np.abs(expected), axis=0), 1.0)
@@ -96,7 +88,7 @@ def test_strains_and_normal_stresses_are_those_of_full_tensors(model):
 
 
 def test_effects_follow_their_equations(model):
-    batch, thetas = make_batch(RUNS), vectors(model)
+    batch, thetas = make_batch(RUNS), vectors_of_each(model, NAMES)
     found = model.predictions(thetas, batch)
     for row, run in enumerate(RUNS):
         any_of_them = ContinuousFluid(model, thetas[0], run.protocol.kinematics)
@@ -116,7 +108,7 @@ def test_effects_follow_their_equations(model):
 
 
 def test_a_vector_does_not_depend_on_those_beside_it(model):
-    batch, thetas = make_batch(RUNS), vectors(model)
+    batch, thetas = make_batch(RUNS), vectors_of_each(model, NAMES)
     together = model.predictions(thetas, batch)
     for i in (0, 2, len(thetas) - 1):
         alone = model.predictions(thetas[i : i + 1], batch)[0]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from in_continuous_time import ContinuousFluid
 from scipy.optimize import brentq
+from vectors import vector_of
 
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -34,13 +35,8 @@ def asked():
             curve("extension", in_flow(steady_rates(SLOW), "uniaxial"), SLOW),
         ]
     )
-    vectors = [model.zero()]
-    for names in (["ptt_exponential"], ["wall_slip"], NAMES):
-        theta = model.zero()
-        for name in names:
-            theta[model.positions(name)] = model.first_trial[model.positions(name)]
-        vectors.append(theta)
-    return model, batch, np.array(vectors)
+    tried = (), ("ptt_exponential",), ("wall_slip",), NAMES
+    return model, batch, np.array([vector_of(model, *names) for names in tried])
 
 
 def ptt(rate, time, epsilon, extends):
@@ -69,8 +65,7 @@ def test_ptt_has_its_closed_flow_curve_in_shear_and_extension(asked):
 
 def test_a_state_that_no_flow_reaches_is_told_and_spoils_none_beside_it(asked):
     model, batch, vectors = asked
-    away = model.zero()
-    away[model.positions("ptt_exponential")[0]] = -0.5
+    away = vector_of(model, ptt_exponential=-0.5)
     found, calm = model.predictions([away, vectors[0]], batch)
     # f² ln f = 2 ε Wi² is nowhere less than −1/(2 e)
     none = (TIMES[1] * RATES) ** 2 > 1.0 / (2.0 * np.e)

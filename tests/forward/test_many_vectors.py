@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from in_continuous_time import ContinuousFluid
+from vectors import vector_of
 
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, EffectParameter, make_effect
@@ -22,7 +23,7 @@ NAMES = (
     "giesekus_mobility", "ptt_exponential", "thixotropy", "viscous_heating", "tool_compliance",
     "wall_slip", "rate_rise_time", "transducer_lag", "relaxation_mode",
 )  # fmt: skip
-TERMS = "tr(sigma.sigma)*sigma.sigma", "tr(sigma.gammadot)*I"
+TERMS = "tr(sigma.sigma)*sigma.sigma", "tr(sigma.gammadot)*sigma.sigma"  # one tensor
 
 
 def runs():
@@ -46,11 +47,7 @@ def asked():
     names = [effect.name for effect in effects]
     vectors = [model.zero()]
     for one, other in zip(names, names[1:] + names[:1], strict=True):
-        for together in ([one], [one, other]):
-            theta = model.zero()
-            for name in together:
-                theta[model.positions(name)] = model.first_trial[model.positions(name)]
-            vectors.append(theta)
+        vectors += [vector_of(model, one), vector_of(model, one, other)]
     vectors[3][1] = 0.2  # other times than those that most have
     return model, make_batch(runs()), np.array(vectors)
 
@@ -65,7 +62,8 @@ def test_effects_of_every_kind_follow_their_equations(asked):
     ]
     for row, run in enumerate(runs()[1:], start=1):
         any_of_them = ContinuousFluid(model, vectors[0], run.protocol.kinematics)
-        for number in range(1, len(vectors), 2):  # those with one effect
+        # those with one effect, and terms together: two with names, two of the library, one of each
+        for number in (*range(1, len(vectors), 2), 2, -3, -1):
             fluid = any_of_them.of(vectors[number])
             own = found[number, row, : len(run)] / largest[number, row]
             # the error of the steps: what gives way, what the instrument shapes, and heat, which is
@@ -88,8 +86,7 @@ def test_a_vector_does_not_depend_on_those_beside_it(asked):
 
 def test_a_trial_that_runs_away_is_told_from_the_sample_on_where_shorter_steps_tell_it(asked):
     model, batch, vectors = asked
-    away = model.zero()
-    away[model.positions(TERMS[0])] = -5.0
+    away = vector_of(model, **{TERMS[0]: -5.0})
     found, calm = model.predictions([away, vectors[1]], batch)
     exact = model.predict(away, make_batch(runs(), strain_step=0.02))
     samples = np.sum(np.abs(found) < 1e6, axis=1), np.sum(np.abs(exact) < 1e6, axis=1)
@@ -121,8 +118,7 @@ def test_an_effect_that_lanes_do_not_know_is_predicted_all_the_same():
     model = AugmentedModel(DeclaredModel.maxwell(50.0, 2.0), [effect])
     times = np.linspace(0.1, 6.0, 20)
     batch = make_batch([Run("a", times, start_up(0.5), np.full(20, 0.5), np.full(20, 10.0))])
-    theta = model.zero()
-    theta[model.positions("iterated")] = 1.0
+    theta = vector_of(model, iterated=1.0)
     # with c = 1 the mode relaxes twice as fast
     exact = 50.0 * 0.5 * 1.0 * (1.0 - np.exp(-times / 1.0))
     # the error of the steps that a loop takes
@@ -139,42 +135,24 @@ def counted(monkeypatch):
 
 
 @pytest.mark.usefixtures("code_of_every_effect")
-def test_another_set_of_effects_on_the_same_runs_compiles_nothing(monkeypatch):
+def test_another_set_of_effects_or_of_runs_compiles_nothing(monkeypatch):
     batch, declared = make_batch(runs()[:2]), DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0])
 
-    def predicted(declared, *names):
+    def predicted(declared, *names, batch=batch):
         model = AugmentedModel(declared, [make_effect(name) for name in names])
-        theta = model.zero()
-        for name in names:
-            theta[model.positions(name)] = model.first_trial[model.positions(name)]
-        return model.predict(theta, batch)
+        return model.predict(vector_of(model, *names), batch)
 
     predicted(declared, "giesekus_mobility", "rate_rise_time", "transducer_lag")
     kernels, programs = counted(monkeypatch)
     predicted(declared, "thixotropy", "stress_gain", "wall_slip", TERMS[0], "relaxation_mode")
     predicted(replace(declared, fit_modulus=True), "ptt_exponential")
+    for others in (runs()[1:2], [*runs()[:2], *runs()[:2]]):
+        predicted(declared, "thixotropy", batch=make_batch(others))
     assert (len(kernels), len(programs)) == (0, 0)
     # negative control: an effect of a user's own is none of those that stand in every kernel
     model = AugmentedModel(declared, [replace(make_effect("giesekus_mobility"), name="of_my_own")])
     model.predict(model.zero(), batch)
     assert (len(kernels), len(programs)) == (1, 1)
-
-
-def test_other_free_constants_of_a_law_share_the_code(monkeypatch):
-    batch = make_batch(runs()[:2])
-    constants = {"epsilon": 0.2, "xi": 0.1}
-
-    def predicted(*free):
-        model = AugmentedModel(
-            DeclaredModel.named("ptt_linear_non_affine", constants, [60.0, 20.0], [0.1, 2.0], free),
-            [],
-        )
-        return model.predict(model.zero(), batch)
-
-    one = predicted("epsilon")
-    kernels, _ = counted(monkeypatch)
-    np.testing.assert_allclose(predicted("xi", "epsilon"), one, rtol=1e-12)
-    assert not kernels
 
 
 def test_moved_moduli_move_the_prediction_as_the_closed_form_says():

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from independent.homogeneous import GiesekusFluid
+from vectors import sweep_of, vectors_of_each
 
 import discover as dc
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.of_fluids import bare_run, observed
-from discover.protocols import oscillations, oscillatory_shear, start_up
+from discover.protocols import oscillatory_shear, start_up
 from discover.protocols.control import steady_rates
 from discover.protocols.kinematics import RecordedQuantity
 from discover.protocols.protocol import in_flow, recording
@@ -47,12 +48,9 @@ def model():
 
 def vectors(model, names=NAMES):
     """Return the Giesekus fluid, and one with each of some effects more."""
-    found = [model.zero() for _ in range(1 + len(names))]
-    for theta in found:
-        theta[model.positions("giesekus_mobility")[0]] = 0.3
-    for theta, name in zip(found[1:], names, strict=True):
-        theta[model.positions(name)] = model.first_trial[model.positions(name)]
-    return np.array(found)
+    found = vectors_of_each(model, names)
+    found[:, model.positions("giesekus_mobility")[0]] = 0.3
+    return found
 
 
 def observables_by_scipy(run):
@@ -123,10 +121,6 @@ def test_a_flow_that_records_a_normal_stress_can_be_followed_without_a_record(qu
 
 def test_a_sweep_has_no_normal_stresses(model):
     strains, ones = np.array([0.1, 1.0]), np.ones(2)
-    sweep = Run(
-        "sweep", np.array([1.0, 2.0]), oscillations(strains, ones), strains, ones,
-        strain=strains, storage_modulus=ones, loss_modulus=ones,
-    ).records  # fmt: skip
-    found = model.observables(vectors(model, ()), make_batch(sweep))
+    found = model.observables(vectors(model, ()), make_batch(sweep_of(strains, ones).records))
     assert np.all(np.isfinite(found[..., 0]))
     assert np.all(np.isnan(found[..., 1:]))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from independent.homogeneous import GiesekusFluid
+from vectors import vector_of, vectors_of_each
 
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -36,17 +37,12 @@ def runs():
 def asked():
     declared = DeclaredModel.maxwell(MODULUS, TIME, solvent_viscosity=SOLVENT)
     model = AugmentedModel(declared, [make_effect(name) for name in NAMES])
-    vectors = [model.zero() for _ in range(1 + len(NAMES))]
-    for theta, name in zip(vectors[1:], NAMES, strict=True):
-        theta[model.positions(name)] = model.first_trial[model.positions(name)]
-    return model, make_batch(runs()), np.array(vectors)
+    return model, make_batch(runs()), vectors_of_each(model, NAMES)
 
 
 def test_a_periodic_start_is_what_scipy_comes_to_after_many_cycles(asked):
     model, batch, _ = asked
-    theta = model.zero()
-    theta[model.positions("giesekus_mobility")[0]] = MOBILITY
-    (found,) = model.observables([theta], batch)
+    (found,) = model.observables([vector_of(model, giesekus_mobility=MOBILITY)], batch)
     fluid = GiesekusFluid(MODULUS, TIME, MOBILITY, SOLVENT)
     # after ten cycles, ten of the longest time, what was before is forgotten
     total = fluid.stress(
@@ -86,8 +82,7 @@ def test_a_vector_does_not_depend_on_those_beside_it(asked):
 
 def test_a_start_that_no_cycle_brings_back_is_no_number_and_spoils_none_beside_it(asked):
     model, batch, vectors = asked
-    away = model.zero()
-    away[model.positions("giesekus_mobility")[0]] = -20.0
+    away = vector_of(model, giesekus_mobility=-20.0)
     lost, calm = model.predictions([away, vectors[1]], batch)
     assert not np.any(np.isfinite(lost[0]))
     np.testing.assert_allclose(calm, model.predictions(vectors[1:2], batch)[0], rtol=1e-9)

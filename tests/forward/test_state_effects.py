@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from independent import authors
+from independent.homogeneous import UNIT
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
+from vectors import vector_of
 
 from discover.dataset import Run
 from discover.effects import RadialAverage, make_effect, named_effects
@@ -30,11 +33,7 @@ MODEL = AugmentedModel(
 
 
 def predict(**effects):
-    theta = MODEL.zero()
-    for name, values in effects.items():
-        at = MODEL.positions(name)
-        theta[at[: len(np.atleast_1d(values))]] = values
-    return MODEL.predict(theta, BATCH)
+    return MODEL.predict(vector_of(MODEL, **effects), BATCH)
 
 
 def maxwell_in_start_up(modulus, time, rate=STEADY):
@@ -51,14 +50,6 @@ def integrate(slope, size, rate):
         method="DOP853", rtol=1e-10, atol=1e-10,
     )  # fmt: skip
     return solution.y
-
-
-@pytest.mark.slow
-def test_all_effects_together_at_zero_amplitude_leave_maxwell():
-    start, oscillation = predict()
-    np.testing.assert_allclose(start, maxwell_in_start_up(MODULUS, TIME), rtol=1e-6)
-    exact = integrate(lambda y, r: MODULUS * r - y / TIME, 1, oscillating_rate)[0]
-    np.testing.assert_allclose(oscillation, exact, atol=1e-4 * MODULUS)
 
 
 # an error of the normal force leaves a shear stress as it is (tests/inference/test_transducers.py),
@@ -90,10 +81,8 @@ def test_every_effect_changes_the_record_and_composes_with_another(name):
 def test_a_zero_of_the_transducer_stood_there_before_the_record(slow):
     times = np.linspace(0.0, 2.0, 21)
     run = Run("from_zero", times, start_up(STEADY), np.full(21, STEADY), np.ones(21))
-    batch, thetas = make_batch([run]), np.tile(MODEL.zero(), (2, 1))
-    thetas[:, MODEL.positions(slow)[0]] = 0.05
-    thetas[1, MODEL.positions("stress_offset")[0]] = 7.0
-    without, with_zero = MODEL.predictions(thetas, batch)
+    thetas = [vector_of(MODEL, **{slow: 0.05, "stress_offset": zero}) for zero in (0.0, 7.0)]
+    without, with_zero = MODEL.predictions(thetas, make_batch([run]))
     # rounding alone; a zero that began with the record would be missing from the first sample
     np.testing.assert_allclose(with_zero - without, 7.0, atol=1e-9)
 
@@ -102,45 +91,6 @@ def test_an_extra_mode_adds_its_own_start_up():
     start = predict(relaxation_mode=(40.0, 0.3))[0]
     exact = maxwell_in_start_up(MODULUS, TIME) + maxwell_in_start_up(40.0, 0.3)
     np.testing.assert_allclose(start, exact, rtol=1e-6)
-
-
-def test_structure_breaks_down_as_moores_equation_says():
-    breakdown, build_up = 0.3, 2.0
-    start = predict(thixotropy=(breakdown, build_up))[0]
-    decay = 1 / build_up + breakdown * STEADY
-    end = 1 / build_up / decay
-    structure = end + (1 - end) * np.exp(-decay * TIMES)
-    exact = structure * maxwell_in_start_up(MODULUS, TIME)
-    # the rate is constant, so the step of the structure is exact
-    np.testing.assert_allclose(start, exact, rtol=1e-6)
-
-
-def test_slip_lowers_the_steady_stress_and_shortens_its_growth():
-    slip = 0.004
-    start = predict(wall_slip=slip)[0]
-    # σ' = G(γ̇ − sσ) − σ/λ
-    faster = 1 / TIME + slip * MODULUS
-    exact = MODULUS * STEADY / faster * (1 - np.exp(-faster * TIMES))
-    # second order in steps of 0.1 strain
-    np.testing.assert_allclose(start, exact, rtol=2e-3)
-    assert start[-1] < maxwell_in_start_up(MODULUS, TIME)[-1]
-
-
-def test_compliance_delays_the_stress_and_leaves_its_steady_value():
-    compliance = 0.004
-    start, oscillation = predict(tool_compliance=compliance)
-    # σ' = G(γ̇ − Cσ') − σ/λ
-    slower = TIME * (1 + compliance * MODULUS)
-    exact = MODULUS * TIME * STEADY * (1 - np.exp(-TIMES / slower))
-    np.testing.assert_allclose(start, exact, rtol=2e-3)
-    assert start[-1] == pytest.approx(maxwell_in_start_up(MODULUS, TIME)[-1], rel=5e-3)
-
-    def slope(y, rate):
-        return (MODULUS * rate - y / TIME) / (1 + compliance * MODULUS)
-
-    exact = integrate(slope, 1, oscillating_rate)[0]
-    # what gives way is constant in a step of 0.13 rad
-    np.testing.assert_allclose(oscillation, exact, atol=5e-3 * np.max(exact))
 
 
 def test_slip_and_compliance_in_series_with_a_giesekus_fluid_that_has_a_solvent():
@@ -191,19 +141,10 @@ def test_heat_and_work_shorten_the_relaxation_times(name):
 
 
 def test_a_yield_stress_raises_the_steady_stress_as_saramito_says():
-    yield_strain = 0.2
-
-    def slope(y, rate):
-        s11, s22, s33, s12 = y
-        deviator = 0.5 * (s11**2 + s22**2 + s33**2 + 2 * s12**2 - (s11 + s22 + s33) ** 2 / 3)
-        share = max(0.0, 1 - yield_strain / np.sqrt(max(deviator, 1e-24)))
-        return [
-            2 * rate * s12 - share * s11, -share * s22, -share * s33,
-            rate * (1 + s22) - share * s12,
-        ]  # fmt: skip
-
-    start = predict(yield_stress=yield_strain)[0]
-    exact = MODULUS * integrate(slope, 4, lambda t: STEADY)[3]
+    start = predict(yield_stress=0.2)[0]
+    gradient = STEADY * UNIT["shear"]
+    stress = authors.stress(authors.saramito, {"yield_strain": 0.2}, gradient, TIMES, TIME)
+    exact = MODULUS * stress[:, 0, 1]
     np.testing.assert_allclose(start, exact, atol=1e-3 * np.max(exact))
     assert start[-1] > 1.05 * maxwell_in_start_up(MODULUS, TIME)[-1]
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from independent import Giesekus, JohnsonSegalman, PhanThienTanner, Structured, steps
+from vectors import vector_of
 
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -45,18 +46,15 @@ LAWS = {
 
 @pytest.mark.parametrize(
     # the two that err most: a law that thins fast, and a jump of a hundred
-    ("law", "before"),
+    ("law", "before", "share"),
     [
-        ("ptt_linear", BEFORE),
-        ("giesekus", 50.0),
-        *(
-            pytest.param(name, BEFORE, marks=pytest.mark.slow)
-            for name in LAWS
-            if name != "ptt_linear"
-        ),
+        ("ptt_linear", BEFORE, 0.23), ("giesekus", 50.0, 0.73),
+        *(pytest.param(law, BEFORE, share, marks=pytest.mark.slow)
+          for law, share in (("ptt_exponential", 0.26), ("giesekus", 0.36),
+                             ("johnson_segalman", 0.56))),
     ],
-)
-def test_a_run_from_a_steady_flow_is_exact_without_the_idle_pieces(law, before, monkeypatch):
+)  # fmt: skip
+def test_a_run_from_a_steady_flow_is_exact_without_the_idle_pieces(law, before, share, monkeypatch):
     parameters, independent = LAWS[law]
     one, held = run(before, AFTER)
     taken, batch = counted(monkeypatch), make_batch([one])
@@ -64,12 +62,11 @@ def test_a_run_from_a_steady_flow_is_exact_without_the_idle_pieces(law, before, 
     found = model.predict(model.zero(), batch)[0]
     exact = independent.respond(steps([0.0, held], [before, AFTER]), held + TIMES).sigma12
     # what the grid's own steps after the jump leave, most where a law thins fast
-    most = 3e-5 if law == "ptt_linear" else 5e-6
+    most = 3e-5 if law == "ptt_linear" else 3e-6
     np.testing.assert_allclose(found, exact, atol=most * np.max(np.abs(exact)))
-    # at a rate of 5 steady after a sixth of the flow before, Johnson-Segalman, which rings, after
-    # half; at 50, held for a tenth of the time, after two thirds
-    most_taken = 0.75 if before > BEFORE else 0.6
-    assert taken[0] < most_taken * int(np.sum(batch.parts[0].pieces))
+    # each law is steady after a time of its own, the sooner the more it thins, Johnson-Segalman,
+    # which rings, latest; at 50 the flow before lasts a tenth as long. A fiftieth more is allowed
+    assert taken[0] < share * int(np.sum(batch.parts[0].pieces))
 
 
 STRUCTURE = "thixotropic_relaxation_two_times"
@@ -80,8 +77,7 @@ def test_a_flow_before_a_run_lasts_as_long_as_it_says():
     """A structure of 240 s is not steady after a minute, and no steady state stands in for it."""
     one, held = run(BEFORE, 0.1)
     model = AugmentedModel(DeclaredModel.maxwell(1.0, 0.4), [make_effect(STRUCTURE)])
-    theta = model.zero()
-    theta[model.positions(STRUCTURE)] = 1.0 / CRITICAL, BUILD_UP, SLOWNESS, SHARE
+    theta = vector_of(model, **{STRUCTURE: (1.0 / CRITICAL, BUILD_UP, SLOWNESS, SHARE)})
     fluid = Structured(
         CRITICAL, (BUILD_UP, SLOWNESS * BUILD_UP), 2.0 / 3.0, SHARE, modulus=1.0,
         relaxation_time=0.4, mobility=0.0,
@@ -124,17 +120,15 @@ def test_a_signal_altered_by_nothing_is_the_signal():
     batch = make_batch([one])
     plain = model.predict(model.zero(), batch)
     for name in names:
-        theta = model.zero()
-        theta[model.positions(name)] = 1e-12
+        theta = vector_of(model, **{name: 1e-12})
         np.testing.assert_allclose(model.predict(theta, batch), plain, rtol=1e-8)
 
 
 def test_a_vector_that_runs_away_before_the_record_is_told_so():
     one, _ = run(BEFORE, AFTER)
     model = AugmentedModel(DeclaredModel.maxwell(1.0, 1.0), [make_effect("giesekus_mobility")])
-    away, calm = model.zero(), model.zero()
-    away[model.positions("giesekus_mobility")] = -5.0
-    found = model.predictions([away, calm], make_batch([one]))
+    away = vector_of(model, giesekus_mobility=-5.0)
+    found = model.predictions([away, model.zero()], make_batch([one]))
     assert not np.any(np.abs(found[0]) < 1e3)
     fading = AFTER + (BEFORE - AFTER) * np.exp(-TIMES)
     np.testing.assert_allclose(found[1, 0], fading, rtol=1e-9)

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from in_continuous_time import ContinuousFluid
-from scipy.integrate import solve_ivp
+from independent.sweeps import giesekus_modulus
+from vectors import sweep_of, vector_of, vectors_of_each
 
-from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.protocols import oscillations
 
 MODULI, TIMES, SOLVENT = np.array([60.0, 20.0]), np.array([0.1, 2.0]), 1.0
 STRAINS, FREQUENCIES = np.array([0.01, 1.0, 3.0, 0.01, 0.5]), np.array([0.3, 1.0, 2.0, 30.0, 5.0])
@@ -18,12 +17,7 @@ STRAINS, FREQUENCIES = np.array([0.01, 1.0, 3.0, 0.01, 0.5]), np.array([0.3, 1.0
 @pytest.fixture(scope="module")
 def asked():
     """Return a model and a sweep."""
-    n = len(STRAINS)
-    run = Run(
-        "sweep", np.arange(1.0, n + 1.0), oscillations(STRAINS, FREQUENCIES),
-        STRAINS * FREQUENCIES, np.ones(n), strain=STRAINS, storage_modulus=np.ones(n),
-        loss_modulus=np.ones(n),
-    )  # fmt: skip
+    run = sweep_of(STRAINS, FREQUENCIES)
     declared = DeclaredModel.maxwell(MODULI, TIMES, solvent_viscosity=SOLVENT)
     effects = [make_effect(name) for name in ("giesekus_mobility", "stress_gain")]
     return AugmentedModel(declared, effects), make_batch(run.records)
@@ -32,38 +26,9 @@ def asked():
 def predicted(asked, amplitudes):
     """Return complex moduli of vectors."""
     model, batch = asked
-    thetas = np.tile(model.zero(), (len(amplitudes), 1))
-    for theta, values in zip(thetas, amplitudes, strict=True):
-        for name, value in values.items():
-            theta[model.positions(name)[0]] = value
+    thetas = [vector_of(model, **values) for values in amplitudes]
     storage, loss = np.moveaxis(model.predictions(thetas, batch), 1, 0)
     return storage + 1j * loss
-
-
-def giesekus(strain, frequency, mobility):
-    """Return G′ + iG″ of the modes, by scipy over cycles enough for the start to be forgotten."""
-
-    def of(time):
-        def change(t, s):
-            xx, yy, xy = s
-            flow = time * strain * frequency * np.cos(frequency * time * t)
-            return [
-                2.0 * flow * xy - xx - mobility * (xx * xx + xy * xy),
-                -yy - mobility * (yy * yy + xy * xy),
-                flow * (1.0 + yy) - xy - mobility * xy * (xx + yy),
-            ]
-
-        period = 2.0 * np.pi / (frequency * time)
-        begins = np.ceil(30.0 / period) * period
-        phase = np.linspace(0.0, 2.0 * np.pi, 129)[:-1]
-        when = begins + phase / (frequency * time)
-        found = solve_ivp(
-            change, (0.0, when[-1]), np.zeros(3), "LSODA", when, rtol=1e-11, atol=1e-13
-        )
-        # of what is periodic, the sum over a period is exact to all orders
-        return np.mean(found.y[2] * 2j * np.exp(-1j * phase)) / strain
-
-    return sum(g * of(time) for g, time in zip(MODULI, TIMES, strict=True))
 
 
 def test_a_maxwell_fluid_has_its_closed_moduli_at_every_strain(asked):
@@ -82,7 +47,10 @@ def test_a_maxwell_fluid_has_its_closed_moduli_at_every_strain(asked):
 
 def test_a_giesekus_fluid_has_the_moduli_that_scipy_ends_at(asked):
     (found,) = predicted(asked, [{"giesekus_mobility": 0.3}])
-    exact = [giesekus(*each, 0.3) for each in zip(STRAINS, FREQUENCIES, strict=True)]
+    exact = [
+        sum(giesekus_modulus(0.3, *mode, *wave) for mode in zip(MODULI, TIMES, strict=True))
+        for wave in zip(STRAINS, FREQUENCIES, strict=True)
+    ]
     # as above
     np.testing.assert_allclose(found, np.array(exact) + 1j * FREQUENCIES * SOLVENT, rtol=2e-5)
 
@@ -97,8 +65,7 @@ def test_a_vector_of_a_sweep_does_not_depend_on_those_beside_it(asked):
 
 def test_moduli_of_each_vector_and_its_solvent_are_its_own(asked):
     model, batch = asked
-    theta = model.zero()
-    theta[model.positions("giesekus_mobility")[0]] = 0.3
+    theta = vector_of(model, giesekus_mobility=0.3)
     # one mode at a time, and the solvent alone
     found = model.predictions([theta] * 4, batch, np.vstack([model.moduli, np.diag(model.moduli)]))
     # the record is linear in the moduli, each mode's own and the solvent's
@@ -110,9 +77,7 @@ def test_what_gives_way_takes_its_share_of_the_closed_moduli(asked):
     model, batch = asked
     names = "wall_slip", "tool_compliance"
     model = AugmentedModel(model.declared, list(map(make_effect, names)))
-    thetas = np.tile(model.zero(), (3, 1))
-    for theta, name in zip(thetas[1:], names, strict=True):
-        theta[model.positions(name)] = model.first_trial[model.positions(name)]
+    thetas = vectors_of_each(model, names)
     slip, compliance = (thetas[i, model.positions(name)[0]] for i, name in enumerate(names, 1))
     storage, loss = np.moveaxis(model.predictions(thetas, batch), 1, 0)
     bare, *found = storage + 1j * loss
@@ -135,16 +100,10 @@ def test_what_couples_the_modes_comes_to_where_scipy_ends(asked, trial):
     names = "giesekus_mobility", "thixotropy", "wall_slip"
     model = AugmentedModel(model.declared, list(map(make_effect, names)))
     strain, frequency = np.array([0.3, 3.0]), np.array([2.0, 1.0])
-    run = Run(
-        "sweep", np.arange(1.0, 3.0), oscillations(strain, frequency), strain * frequency,
-        np.ones(2), strain=strain, storage_modulus=np.ones(2), loss_modulus=np.ones(2),
-    )  # fmt: skip
-    theta = model.zero()
+    theta = vector_of(model, *trial)
     for name, share in trial.items():
-        at = model.positions(name)
-        theta[at] = model.first_trial[at]
-        theta[at[0]] *= share
-    batch = make_batch(run.records)
+        theta[model.positions(name)[0]] *= share
+    batch = make_batch(sweep_of(strain, frequency).records)
     (storage, loss), still = model.predict(theta, batch), model.predict(model.zero(), batch)
     fluid = ContinuousFluid(model, theta)
     pairs = zip(strain, frequency, strict=True)

@@ -1,4 +1,4 @@
-"""Exact arithmetic on library terms: relations in shear, Taylor series, twins by series."""
+"""Exact arithmetic on library terms: relations in shear, series, twins; sums in a sentence."""
 
 from fractions import Fraction
 
@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from discover.identify.exact_series import (
-    PRIME,
     compare_series,
     exact_terms,
-    residue,
     solve_for_coefficient,
     stress_series,
 )
-from discover.identify.relations import feels_33, term_relations
+from discover.identify.relations import feels_33, spell_briefly, term_relations
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate
 from discover.simulate import simulate
@@ -86,11 +84,6 @@ def test_what_feels_33_is_what_holds_a_trace_of_stress():
     assert not feels_33(library_of("sigma.sigma", SLIP, "tr(sigma.gammadot)*I"))
 
 
-def test_residues_of_fractions_multiply_like_fractions():
-    a, b = Fraction(3, 7), Fraction(-11, 13)
-    assert residue(a) * residue(b) % PRIME == residue(a * b)
-
-
 def test_the_series_of_a_law_is_its_trajectory_at_small_times():
     rate = [Fraction(1), Fraction(-1, 2)]
     series = stress_series({"sigma.sigma": Fraction(1, 5)}, rate, order=9)
@@ -133,5 +126,13 @@ def test_an_irrational_twin_is_given_but_not_called_proved():
     assert not proved
 
 
-def test_sums_of_terms_are_spelled_with_signs():
-    assert spell({"sigma.sigma": -0.2, SLIP: 1.0}) == f"−0.2 sigma.sigma + ({SLIP})"
+def test_a_sum_of_few_terms_is_spelled_out():
+    few = {"sigma.sigma": 0.5, "gammadot": -1.0}
+    assert spell_briefly(few) == spell(few) == "0.5 sigma.sigma − gammadot"
+
+
+def test_a_sum_of_many_terms_is_its_largest_two_and_a_number():
+    names = ("I", "sigma", "gammadot", "sigma.sigma", "gammadot.gammadot", "tr(sigma)*sigma")
+    many = {name: (-1.0) ** i * 0.1 * i for i, name in enumerate(names)}
+    said = spell_briefly(many)
+    assert said == "−0.5 tr(sigma)*sigma + 0.4 gammadot.gammadot with 4 smaller terms"

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discover.identify.relations import weak_directions
 from discover.identify.structure import analyse_structure
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
@@ -113,18 +112,3 @@ def test_the_structure_is_plain_json_and_counts(structure):
     content = json.loads(json.dumps(structure.to_json(), allow_nan=False))
     assert content["n_terms"] == len(LIBRARY)
     assert str(len(structure.laws[0].exact)) in content["text"]
-
-
-def test_directions_of_a_small_known_matrix():
-    # a + b is seen, a − b is not; c is seen weakly
-    observed = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1e-3]])
-    blocks = {"sigma12": observed, "N1": np.array([[1.0, 0.0, 0.0]]), "N2": np.zeros((1, 3))}
-    exact, weak = weak_directions(("a", "b", "c"), observed, blocks, n_observations=100)
-    assert len(exact) == 1
-    assert exact[0].coefficients == pytest.approx({"a": -1.0, "b": 1.0}) or exact[
-        0
-    ].coefficients == pytest.approx({"a": 1.0, "b": -1.0})
-    assert exact[0].changes["N1"] == pytest.approx(1.0)
-    lone = next(d for d in weak if "c" in d.coefficients)
-    # standard error noise/(√100 · 1e-3) is 0.1 at noise 1e-3
-    assert lone.noise_for_tenth == pytest.approx(1e-3)

@@ -5,20 +5,16 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from discover.forward.of_fluids import bare_run
 from discover.identify import side_by_side
 from discover.identify.exact_series import compare_series
 from discover.identify.twins import find_twins, hidden_stresses
 from discover.laws import (
     ExponentialPhanThienTanner,
-    Fluid,
     Giesekus,
     JohnsonSegalman,
     LinearPhanThienTanner,
     UpperConvectedMaxwell,
 )
-from discover.protocols import in_flow, start_up
-from discover.simulate import simulate
 from tensor_library import LawTerms, build_library, parse_term
 
 SLIP = "sigma.gammadot+gammadot.sigma"
@@ -100,27 +96,6 @@ def test_a_law_that_runs_away_is_infinitely_far():
     laws = [LawTerms({}), LawTerms({"tr(sigma)*sigma": -5.0})]
     (apart,) = side_by_side.differences(side_by_side.stresses_in_histories(LIBRARY, laws))
     assert apart.sigma12 == np.inf
-
-
-def test_random_histories_span_weak_to_strong_flows_and_repeat():
-    flows = side_by_side.random_histories()
-    assert flows.amplitude.min() < 0.5
-    assert flows.amplitude.max() > 2.0
-    again = side_by_side.random_histories.__wrapped__()
-    for one, other in zip(flows.runs, again.runs, strict=True):
-        assert np.array_equal(one.rate, other.rate)
-
-
-@pytest.mark.slow
-def test_laws_side_by_side_extend_as_one_alone():
-    times = np.linspace(0, 4, 81)
-    laws = [LawTerms({"sigma.sigma": 0.2}), LawTerms({})]
-    protocol = in_flow(start_up(0.3), "uniaxial")
-    found = side_by_side.stresses_of_laws(LIBRARY, laws, [bare_run(protocol, times)])
-    alone = simulate(Fluid.dimensionless(Giesekus(0.2)), protocol, times)
-    # fourth-order steps of 0.05 on rates of order one
-    np.testing.assert_allclose(found[0, 0, :, 1], alone.first_normal_stress_difference, atol=1e-6)
-    np.testing.assert_allclose(found[0, 0, :, 2], alone.second_normal_stress_difference, atol=1e-6)
 
 
 def test_what_separates_a_law_from_itself_is_nothing():

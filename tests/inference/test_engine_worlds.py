@@ -107,16 +107,6 @@ def test_bands_hold_runs_that_no_fit_saw(asked, world):
     assert width < (4.0 if world == POM_POM else 0.2) * typical
 
 
-def test_a_hypothesis_holds_nothing_that_is_not_in_its_set(asked):
-    posterior, problem, _ = asked[MAXWELL]
-    at = problem.model.positions("giesekus_mobility")[0]
-    theta = problem.zero.copy()
-    theta[at] = 0.3
-    fitter = posterior.search.fitter
-    assert fitter.start((), theta).theta[at] == 0.0
-    assert fitter.start(("giesekus_mobility",), theta).theta[at] == 0.3
-
-
 def test_one_explanation_alone_asks_for_no_test_to_tell_it_from_another(asked):
     posterior, *_ = asked[MAXWELL]
     tests = design(posterior)

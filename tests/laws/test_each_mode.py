@@ -16,8 +16,7 @@ from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.of_fluids import observed_in
 from discover.identify.physics import _extension
 from discover.laws import Fluid, make_law
-from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes
-from discover.laws.registry import check_law
+from discover.laws.each_mode import law_of_each_mode, with_modes
 from discover.learners.files import plain, restored
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import initial_law
@@ -132,14 +131,6 @@ def test_what_is_no_law_of_these_modes_is_refused():
         Fluid(giesekus(), MODULI[:2], TIMES[:2])
     with pytest.raises(InputError, match="of one kind"):
         law_of_each_mode([make_law("giesekus", {"alpha": 0.1}), make_law("ucm", {})])
-
-
-def test_a_law_is_taken_apart_by_modes():
-    law = giesekus()
-    assert differs_by_mode(law)
-    assert not differs_by_mode(make_law("giesekus", {"alpha": 0.1}))
-    assert float(law_of_mode(law, 1).mobility) == pytest.approx(0.3)
-    check_law(law)
 
 
 def test_extension_is_bounded_where_it_is_in_every_mode():

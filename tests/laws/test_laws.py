@@ -1,12 +1,19 @@
+"""Laws: what they refuse, what they contain, and those that share a form and its programs."""
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from discover.errors import InputError
-from discover.laws import LAWS, Fluid, TensorBasisNetwork, make_law
-from discover.protocols import in_flow, start_up
+from discover.laws import LAWS, AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, make_law
+from discover.laws.expansion import law_of_terms
+from discover.programs.program_cache import Compiled
+from discover.protocols import in_flow, oscillatory_shear, start_up
 from discover.simulate import SimulationError, simulate
+from tensor_library import LawTerm, LawTerms
+from tensor_library.algebra import Symmetric
 
 
 def test_the_network_is_objective_for_random_weights():
@@ -68,3 +75,41 @@ def test_a_law_is_the_one_that_it_contains_as_its_constant_vanishes_or_ends(law,
     found = make_law(law, own).extra_term(stress, rate)
     # L² = 1e6 and a largest stretch of 100 are limits: (stretch/100)² of the terms
     np.testing.assert_allclose(found, wanted, atol=1e-3)
+
+
+LEARNED = (LawTerm("sigma.sigma", 0.2), LawTerm("gammadot.gammadot", -0.1))
+SUMS = {
+    "Maxwell": make_law("ucm"),
+    "Giesekus": make_law("giesekus", {"alpha": 0.3}),
+    "Johnson–Segalman": make_law("johnson_segalman", {"xi": 0.2}),
+    "learned": law_of_terms(LawTerms.of(LEARNED), True),
+    "constants": TensorBasisNetwork(
+        network=None, constants=0.1 * jnp.arange(8.0), network_mask=jnp.zeros(8)
+    ),
+}
+
+
+class Own(AbstractConstitutiveLaw):
+    """A user's own, which writes out another h than it computes."""
+
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        return 0.3 * stress
+
+    def as_terms(self):
+        return (LawTerm("sigma", 0.2),)
+
+
+def test_such_laws_are_simulated_by_one_program(monkeypatch):
+    flow, times = oscillatory_shear(2.0, 1.0), np.linspace(0.0, 5.0, 21)
+    of_maxwell = simulate(Fluid.dimensionless(SUMS["Maxwell"]), flow, times)
+    made, programs = Compiled._made, []
+    monkeypatch.setattr(Compiled, "_made", lambda self, *of: programs.append(1) or made(self, *of))
+    for name in [*SUMS][1:]:
+        found = simulate(Fluid.dimensionless(SUMS[name]), flow, times)
+        assert np.max(np.abs(found.components - of_maxwell.components)) > 0.01
+    assert not programs
+    # negative control
+    simulate(Fluid.dimensionless(Own()), flow, times)
+    assert programs

@@ -1,11 +1,15 @@
-"""Terms that follow correlated noise are no law: data in closed form, noise by scipy."""
+"""The sparse learner in correlated noise, and records that are zero."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from shared_flows import LIBRARY
 
+import discover as dc
 from discover.dataset import Run
+from discover.errors import InputError
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.protocols import start_up
 
@@ -50,3 +54,13 @@ def test_every_sample_counts_in_white_noise(seed):
     model = fitted(0.0, seed)
     assert worth(model) == len(RATES) * len(TIMES)
     assert model.terms_ == ()
+
+
+TIMES_ZERO = np.linspace(0.1, 4.0, 40)
+PLAIN = dc.Run("a.csv", TIMES_ZERO, dc.start_up(1.0), np.ones(40), 1.0 - np.exp(-TIMES_ZERO))
+
+
+@pytest.mark.parametrize("learner", [dc.TensorSINDy(), dc.TBNNUDE()])
+def test_a_record_that_is_zero_throughout_is_refused(learner):
+    with pytest.raises(InputError, match=r"b\.csv.*zero throughout"):
+        learner.fit([PLAIN, replace(PLAIN, name="b.csv", stress=np.zeros(40))])

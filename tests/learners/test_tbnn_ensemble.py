@@ -118,19 +118,6 @@ def test_the_simplest_of_the_members_that_fit_is_taken(first):
     np.testing.assert_array_equal(fits, [True, False, True])
 
 
-def test_halves_of_the_runs_hold_half_of_them():
-    halves = ensemble.halves_of_runs(8, 4, jax.random.key(0))
-    assert [int(np.sum(half)) for half in halves] == [4, 4, 4, 4]
-    np.testing.assert_array_equal(halves[0], ~halves[1])
-    assert not np.array_equal(halves[2], halves[3])
-
-
-def test_a_run_that_is_not_seen_has_no_residual(problem):
-    seen = ensemble.seen_in(problem, np.array([True, False]))
-    np.testing.assert_array_equal(seen.records.weight[0], problem.records.weight[0])
-    np.testing.assert_array_equal(seen.records.seen.sum(axis=1), [41, 0])
-
-
 def test_a_single_run_has_no_halves(problem, first):
     alone = replace(first, varies=False)
     one = eqx.tree_at(lambda tree: tree.flows, problem, problem.flows.some(0, 1))

@@ -11,11 +11,9 @@ from scipy.optimize import least_squares as by_scipy
 
 from discover.dataset import Run
 from discover.laws import Giesekus
-from discover.learners.tbnn_ude import TBNNUDE, least_squares, recipes
+from discover.learners.tbnn_ude import TBNNUDE, recipes
 from discover.learners.tbnn_ude.least_squares import Linearised, Steps
 from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
-from discover.learners.tbnn_ude.session import Session, initial_law, is_white
-from discover.learners.tbnn_ude.variational import Rebuild, side_by_side, states_and_jacobian
 from discover.protocols import in_flow, oscillatory_shear, start_up
 from discover.simulate import synthetic_dataset
 
@@ -42,33 +40,6 @@ def trained(giesekus_problem):
     return recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
 
 
-@pytest.mark.slow
-def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
-    law = recipes.make_network(jax.random.key(1), 3, True)
-    # truncation of order step², rounding of order 1e-16/step
-    told_as_differences(giesekus_problem, law, 1e-5, 1e-7)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n", [1, 2, 3])
-def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
-    law = recipes.make_network(jax.random.key(1), 3, True)
-    rebuild = Rebuild.everything(law)
-    whole = giesekus_problem
-
-    def of_runs(p):
-        return p.records.recorded, p.records.weight, p.stress
-
-    problem = eqx.tree_at(of_runs, whole, [column[:n] for column in of_runs(whole)])
-    problem = eqx.tree_at(lambda p: p.flows, problem, whole.flows.some(0, n))
-    together = states_and_jacobian(rebuild.start, rebuild, giesekus_problem)
-    halves = side_by_side(rebuild.start, rebuild, problem)
-    pairs = zip(jax.tree.leaves(halves), jax.tree.leaves(together), strict=True)
-    for half, whole in pairs:
-        # no more than the rounding of instructions of another width
-        np.testing.assert_allclose(half, whole[:n], rtol=1e-10, atol=1e-13)
-
-
 def test_constants_alone_recover_the_mobility_from_shear_stress(trained):
     assert not trained.varies
     # integration on the training grid errs by 4e-6 of the stress
@@ -80,14 +51,6 @@ def test_the_penalty_shrinks_what_the_polish_restores(trained):
     shrunk = float(trained.penalised_law.constants[3])
     assert abs(shrunk - 0.3) > 1e-5
     assert abs(float(trained.law.constants[3]) - 0.3) < abs(shrunk - 0.3)
-
-
-def test_constants_without_a_network_are_those_beside_one_that_is_zero(giesekus_problem, trained):
-    whole = initial_law(jax.random.key(0), SMALL.width, True, jnp.ones(8))
-    _, law = Session(giesekus_problem, SMALL, None).constants(whole)
-    # the same steps, to rounding
-    np.testing.assert_allclose(trained.law.constants, law.constants, atol=1e-9)
-    assert trained.law.network is None  # so that nothing is compiled or kept of one
 
 
 def test_maxwell_data_leave_nothing_to_learn():
@@ -115,45 +78,6 @@ def test_the_same_key_gives_the_same_law(giesekus_problem, trained):
     assert again.misfit == trained.misfit
     for one, two in zip(jax.tree.leaves(again.law), jax.tree.leaves(trained.law), strict=True):
         np.testing.assert_array_equal(one, two)
-
-
-def test_a_start_that_runs_away_neither_crashes_nor_gives_nan(giesekus_problem):
-    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
-    good = law
-    law = eqx.tree_at(lambda tree: tree.constants, law, jnp.zeros(8).at[3].set(-8.0))
-    rebuild = Rebuild.of_constants(law, np.ones(8, bool), np.ones(8))
-    cloud = least_squares.sample_states(good, giesekus_problem)
-    objective = least_squares.Objective(
-        giesekus_problem, rebuild, cloud, least_squares.reweighted(good, cloud, 1e-3)
-    )
-    weights = least_squares.minimise(rebuild.start, objective, 3)
-    assert np.all(np.isfinite(weights))
-
-
-def test_the_prior_is_the_sum_of_root_mean_squares_at_its_fixed_point(giesekus_problem):
-    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
-    law = eqx.tree_at(lambda tree: tree.constants, law, jnp.array([0, 0.5, 0.0, 0.3, 0, 0, 0, 0]))
-    cloud = least_squares.sample_states(law, giesekus_problem)
-    value = float(
-        jnp.sum(
-            least_squares.prior_residual(law, cloud, least_squares.reweighted(law, cloud, 0.01))
-            ** 2
-        )
-    )
-    amount, variation = least_squares.parts(law, cloud)
-    expected = 0.01 * float(jnp.sum(jnp.sqrt(jnp.mean(amount**2, axis=0))))
-    assert float(jnp.max(jnp.abs(variation))) < 1e-12  # constants do not vary
-    assert value == pytest.approx(expected, rel=2e-3)  # the floor of 1e-4 in the weights
-
-
-@pytest.mark.parametrize(("seed", "kind"), [(0, "white"), (1, "walk")])
-def test_whiteness_tells_noise_from_structure(seed, kind):
-    noise = np.random.default_rng(seed).standard_normal((4, 200))
-    mask = np.ones((4, 200), bool)
-    if kind == "white":
-        assert is_white(noise, mask)
-    else:
-        assert not is_white(noise.cumsum(axis=1), mask)
 
 
 @pytest.mark.slow
@@ -201,26 +125,6 @@ def test_an_absurd_learning_rate_is_survived(giesekus_problem):
     assert all(
         bool(jnp.all(jnp.isfinite(w))) for w in jax.tree.leaves(eqx.filter(law, eqx.is_array))
     )
-
-
-@pytest.mark.slow
-def test_the_network_stands_on_a_known_base_law():
-    data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
-    problem = make_problem(data.runs, np.ones(1), np.ones(1))
-    trained = recipes.train_default(problem, jax.random.key(0), True, SMALL, base_law=Giesekus(0.1))
-    assert float(trained.law.constants[3]) == pytest.approx(0.2, abs=1e-4)  # the rest of 0.3
-
-
-def test_a_descent_far_behind_its_rival_is_given_up_and_one_close_behind_is_not():
-    pace = [1.0 / 2**step for step in range(10)]
-
-    def steps_until_given_up(times_worse):
-        stopping = least_squares.Stopping(0.0, pace)
-        misfits = (times_worse * value for value in pace)
-        return next((i for i, misfit in enumerate(misfits) if stopping.done(misfit)), len(pace))
-
-    assert steps_until_given_up(10.0) < len(pace)
-    assert steps_until_given_up(2.0) == len(pace)
 
 
 @pytest.mark.slow
@@ -290,14 +194,3 @@ def test_a_start_that_runs_away_is_told_by_its_norm():
     descent, norms = descended(np.array([0.0, 3.0]), 2)
     assert not np.any(np.isfinite(norms))
     assert np.array_equal(descent.best, [0.0, 3.0])
-
-
-def test_residuals_alone_reject_a_trial_where_the_derivatives_would_be_of_no_use():
-    expected, _ = descended(START, 60)
-    descent, with_derivatives = Steps(START), 0
-    for _ in range(60):
-        if not descent.goes_up(valley(descent.trial).rows):
-            descent.take(valley(descent.trial))
-            with_derivatives += 1
-    assert np.array_equal(descent.best, expected.best)
-    assert with_derivatives < 60

@@ -88,12 +88,6 @@ def test_noise_is_what_changes_from_sample_to_sample_where_a_residual_is_left():
     assert ended("unexplained", known=0.02).noise == 0.02
 
 
-def test_runs_left_out_are_missed_by_what_is_not_noise():
-    left = Ended._left_out.func
-    assert left(ended("unexplained")) == pytest.approx([0.0693, 0.0794], rel=0.01)
-    assert left(ended("effects_added")) == pytest.approx([0.036, 0.053], rel=0.01)
-
-
 def test_a_run_beyond_the_rates_does_not_count_inside():
     held = record("faster", 3.0, 0.5, held_out=True)
     found = result([*FITTED, held])

@@ -157,14 +157,6 @@ def test_the_records_hold_what_pictures_need(planted_mobility):
     assert max(refitted, key=lambda name: refitted[name]) == "giesekus_mobility"
 
 
-@pytest.mark.slow  # of constants to the last bit: below
-def test_the_same_data_give_the_same_result(planted_mobility):
-    again = loop(make_dataset(Giesekus(0.2)))
-    first, second = planted_mobility.to_json(), again.to_json()
-    first.pop("seconds"), second.pop("seconds")
-    assert first == second
-
-
 def test_held_out_stresses_do_not_enter_the_fit(planted_mobility):
     dataset = make_dataset(Giesekus(0.2))
     changed = replace(dataset["late"], stress=3.0 * dataset["late"].stress)

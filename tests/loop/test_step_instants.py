@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flows import RateSteps
 from discover.loop.measured_rates import with_places, with_rate_steps
 from discover.report.loop import loop_verdict
 
@@ -92,40 +90,6 @@ def test_nothing_is_said_of_steps_where_the_rate_has_none(tmp_path):
     loop = loop_on(tmp_path, flows)
     assert loop.remaining["step_instants"] == {}
     assert "steps between" not in " ".join(loop_verdict(loop))
-
-
-stepped_rate = jax.jit(RateSteps.in_rate)
-
-
-class TestRateSteps:
-    """The rate in one run."""
-
-    times = np.linspace(0.0, 1.0, 21)  # ten steps of the integration, with their middles
-
-    def in_rate(self, share, start=0.2, end=0.6):
-        steps = RateSteps(
-            *(jnp.array([value]) for value in (start, end, 2.0, share)), jnp.array([-1])
-        )
-        straight = 1.0 + 2.0 * np.clip((self.times - start) / (end - start), 0.0, 1.0)
-        times = jnp.asarray(self.times)
-        return np.asarray(stepped_rate(steps, jnp.asarray(straight), times, jnp.zeros(0)))
-
-    @pytest.mark.parametrize("share", [0.0, 0.13, 0.25, 0.5, 0.8, 1.0])
-    def test_has_the_strain_of_the_step_by_simpson_s_rule(self, share):
-        rate = self.in_rate(share)
-        strain = np.sum((rate[:-2:2] + 4.0 * rate[1::2] + rate[2::2]) * 0.1 / 6.0)
-        assert strain == pytest.approx(1.0 + 2.0 * (1.0 - (0.2 + 0.4 * share)), rel=1e-12)
-
-    def test_is_as_recorded_beyond_the_two_samples(self):
-        rate = self.in_rate(0.3)
-        np.testing.assert_array_equal(rate[self.times < 0.21], 1.0)
-        np.testing.assert_array_equal(rate[self.times > 0.59], 3.0)
-
-    def test_changes_smoothly_with_the_instant(self):
-        shares = np.linspace(0.0, 1.0, 101)
-        rates = np.stack([self.in_rate(share) for share in shares])
-        # at most six changes of the rate for the whole interval, which is four steps long
-        assert np.max(np.abs(np.diff(rates, axis=0))) < 2.0 * 4 * 1.5 / 100 * 1.01
 
 
 def maxwell_after_a_step(times, instant):

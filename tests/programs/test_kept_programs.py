@@ -4,7 +4,6 @@ import os
 import pickle
 import subprocess
 import sys
-from collections import Counter
 from functools import partial
 
 import equinox as eqx
@@ -13,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover import compilation_cache
 from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -22,7 +20,6 @@ from discover.forward.program import program_of
 from discover.identify.structure import with_sensitivities
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
-from discover.programs.program_cache import put_together, take_apart
 from discover.programs.store import (
     FOLDER,
     STAMP_FILE,
@@ -178,24 +175,6 @@ def test_a_program_may_be_called_with_numbers_while_another_function_is_traced(f
     np.testing.assert_array_equal(traced, [1.0, 3.0, 5.0])
 
 
-def test_what_a_program_returned_is_taken_by_it_without_compiling_again(folder):
-    built = []
-
-    def listen(event, duration, fun_name=None, **kwargs):
-        if event.endswith("backend_compile_duration") and "_double" in str(fun_name):
-            built.append(fun_name)
-
-    double = compiled(_double, made_from="another test")
-    jax.monitoring.register_event_duration_secs_listener(listen)
-    try:
-        once = double(jnp.arange(3.0))
-        np.testing.assert_array_equal(double(double(once)), [0.0, 8.0, 16.0])
-        double(np.arange(3.0))
-    finally:
-        jax.monitoring.unregister_event_duration_listener(listen)
-    assert len(built) == 1
-
-
 def _times(factor):
     return lambda x: factor * x
 
@@ -289,24 +268,3 @@ def test_shapes_and_types_have_programs_of_their_own(folder):
     assert len(programs(folder)) == 4
     forget_programs()
     np.testing.assert_array_equal(double(np.arange(3.0)), [0.0, 2.0, 4.0])
-
-
-def test_results_are_put_together_as_they_were():
-    leaves = []
-    value = (GIESEKUS, [np.ones(2), None], {"a": 1.5, "b": jnp.zeros(())})
-    nesting = take_apart(value, leaves)
-    again = put_together(nesting, iter(leaves))
-    assert jax.tree.structure(again) == jax.tree.structure(value)
-    assert eqx.tree_equal(again, value)
-    with pytest.raises(NotDescribable):
-        take_apart(object(), [])
-
-
-def test_programs_to_compile_are_counted_among_those_that_were_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(compilation_cache, "_found", Counter())
-    assert compilation_cache.compiled_share() == 0.0
-    assert load_program(tmp_path / "one") is None
-    assert compilation_cache.compiled_share() == 1.0
-    save_program(tmp_path / "one", None, b"code")
-    assert load_program(tmp_path / "one") == (None, b"code")
-    assert compilation_cache.compiled_share() == 0.5

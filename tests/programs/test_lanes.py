@@ -97,19 +97,6 @@ def test_branches_by_numbers_are_taken_lane_by_lane():
     np.testing.assert_allclose(in_lanes(function, x), wanted, rtol=1e-15)
 
 
-def test_arrays_are_moved_summed_and_multiplied():
-    matrix = np.arange(9.0).reshape(3, 3)
-
-    def function(x, y):
-        tensor = jnp.zeros((3, 3)).at[0, 1].set(x).at[2].add(y)
-        tensor = tensor + jnp.asarray(matrix)
-        return jnp.concatenate([(tensor @ tensor.T).ravel()[1:5], jnp.max(tensor, axis=0)[::-1]])
-
-    x, y = np.linspace(1.0, 2.0, LANES), np.linspace(-3.0, 3.0, LANES)
-    wanted = [np.asarray(function(*pair)) for pair in zip(x, y, strict=True)]
-    np.testing.assert_allclose(in_lanes(function, x, y), np.transpose(wanted), rtol=1e-14)
-
-
 def test_what_is_not_known_in_lanes_is_computed_by_jax_for_each_of_them():
     def doubled(x, y):
         reached = jax.lax.while_loop(lambda v: v < 1.0, lambda v: 2.0 * v, x)
@@ -133,12 +120,6 @@ def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
     matrices = np.moveaxis(entries.reshape(3, 3, LANES), -1, 0)
     exact = np.linalg.solve(matrices, right.T[:, :, None])[:, :, 0].T
     np.testing.assert_allclose(found, exact, rtol=1e-11)
-
-
-def test_a_decomposition_alone_is_computed_by_jax():
-    x = np.linspace(1.0, 2.0, LANES)
-    found = in_lanes(lambda x: jax.lax.linalg.lu(jnp.eye(2) * x)[0][0], x)
-    np.testing.assert_array_equal(found, [x, np.zeros(LANES)])
 
 
 def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users(

@@ -30,20 +30,6 @@ def test_two_calls_of_a_compiled_program_run_at_once():
     assert in_threads(lambda job: both.wait(30.0) in (0, 1), range(2), True) == [True, True]
 
 
-def test_the_first_call_runs_alone_where_nothing_is_compiled_yet():
-    seen = []
-    in_threads(lambda job: seen.append((job, threading.current_thread())), range(3))
-    assert seen[0] == (0, threading.main_thread())
-    assert all(thread is not threading.main_thread() for _, thread in seen[1:])
-
-
-def test_threads_are_started_once():
-    started = set()
-    for _ in range(5):
-        in_threads(lambda job: started.add(threading.current_thread()), range(4), True)
-    assert len(started) <= 2
-
-
 def test_what_numpy_is_told_of_overflows_holds_in_threads_and_nowhere_else(recwarn):
     jobs = [np.array([1e300])] * 3
     with np.errstate(over="ignore"):

@@ -1,10 +1,13 @@
-"""Loops that the compiler makes one piece of machine code of."""
+"""Programs and the compiler: loops are one piece, whatever options a user or a version has."""
 
 import os
 import subprocess
 import sys
 
+import jax
 import pytest
+
+from discover.programs.program_cache import _compiled_soon, _whole_loops
 
 LOOP = """
 import discover.compilation_cache
@@ -42,3 +45,12 @@ def test_a_loop_is_one_piece_beside_what_the_user_chose(flags):
 def test_who_chose_the_same_kind_of_option_keeps_it():
     chosen = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=0"
     assert compiled_with(chosen) == (False, chosen)
+
+
+def test_an_option_that_the_compiler_does_not_know_is_left_out(monkeypatch):
+    def refuse(function, **kwargs):
+        raise jax.errors.JaxRuntimeError("No such compile option")
+
+    monkeypatch.setattr(jax, "jit", refuse)
+    assert _compiled_soon.__wrapped__() == {}
+    assert _whole_loops.__wrapped__() == {}

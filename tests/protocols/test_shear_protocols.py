@@ -1,6 +1,5 @@
 """Rates, strains and stresses that are imposed: integrals, jumps and waves."""
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from discover.protocols import (
     paper_test_protocols,
     paper_training_protocols,
     shear_rates,
-    stack_protocols,
     start_up,
     step_rates,
     strains,
@@ -46,14 +44,6 @@ def test_a_step_takes_its_new_rate_at_the_jump():
     assert rates == [1.0, 1.0, -2.0, -2.0, 0.5, 0.5]
 
 
-def test_a_batch_gives_the_rates_of_its_members():
-    flows = list(FLOWS.values())
-    times = jnp.linspace(0.0, 5.0, 23)
-    batch = jax.jit(jax.vmap(lambda flow: jax.vmap(flow.rate)(times)))(stack_protocols(flows))
-    for together, flow in zip(batch, flows, strict=True):
-        np.testing.assert_allclose(together, shear_rates(flow, np.asarray(times)), atol=1e-14)
-
-
 def test_the_paper_trains_on_eight_flows_and_tests_on_three_others():
     training, tests = paper_training_protocols(), paper_test_protocols()
     assert len(training) == 8
@@ -76,14 +66,6 @@ def test_the_paper_trains_on_eight_flows_and_tests_on_three_others():
 def test_a_wrong_protocol_is_refused(make):
     with pytest.raises(InputError):
         make()
-
-
-@pytest.mark.parametrize("flow", FLOWS.values(), ids=FLOWS.keys())
-@pytest.mark.parametrize("n", [1, 33])
-def test_many_samples_at_once_are_what_each_is_alone(flow, n):
-    times = np.linspace(0.0, 3.0, n)
-    of_one = jax.jit(lambda t: flow.rate(t))
-    np.testing.assert_allclose(shear_rates(flow, times), [of_one(t) for t in times], atol=1e-14)
 
 
 TIMES = np.linspace(0.1, 15.0, 150)

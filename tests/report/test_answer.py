@@ -60,17 +60,10 @@ KNOWN, OPEN = ExpectedError(0.03), ExpectedError(missing="not determined", note=
         (("shear",), {"N1": KNOWN}, "σ12 and N1"),
         (("shear",), {"N1": OPEN, "N2": OPEN, "uniaxial": OPEN}, "σ12 only"),
         # what the law alone says counts where it is as good as what is asked of the shear stress
-        (
-            ("shear",),
-            {"N1": replace(KNOWN, is_measured=False)},
-            "σ12 (N1: predicted, not tested)",
-        ),
+        (("shear",), {"N1": replace(KNOWN, is_measured=False)}, "σ12 (N1: predicted, not tested)"),
         (("shear",), {"N1": ExpectedError(0.17, is_measured=False)}, "σ12 only"),
-        (
-            ("shear",),
-            {"N1": ExpectedError(0.17)},
-            "σ12 and N1",
-        ),  # measured: the table has the error
+        # measured: the table has the error
+        (("shear",), {"N1": ExpectedError(0.17)}, "σ12 and N1"),
         (("shear",), {"N1": KNOWN, "uniaxial": ExpectedError(0.54)}, "σ12 and N1"),
         (("shear", "uniaxial"), {}, "σ12 and uniaxial extension"),
         (("uniaxial",), {"uniaxial": KNOWN}, "uniaxial extension only"),

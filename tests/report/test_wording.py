@@ -52,6 +52,7 @@ def test_axes_of_per_cents_have_plain_numbers_and_more_of_them_where_they_are_sh
         return {tick.get_text() for tick in ticks}
 
     assert {"5", "10", "20"} <= labels(4.0, 30.0)
+    assert {"30", "40"} <= labels(23.0, 47.0)  # neither a decade nor a 2 or a 5
     long = labels(0.01, 200.0)
     assert {"0.01", "1", "100"} <= long
     assert "20" not in long

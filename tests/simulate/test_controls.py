@@ -3,31 +3,29 @@
 from dataclasses import replace
 from itertools import pairwise
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import Giesekus
 from independent.sweeps import strain_at
 from scipy.optimize import brentq
+from vectors import sweep_of, vector_of
 
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flows import PeriodicFlows
-from discover.forward.grid import stress_grid
 from discover.protocols import (
     after_alternation,
     after_step_strain,
     imposed_stress,
     in_flow,
-    oscillations,
     oscillatory_shear,
     start_up,
     steady_rates,
 )
 
 MODULUS, TIME = 100.0, 1.0
-TIMES, COUNTED = np.geomspace(0.01, 10.0, 60), np.arange(1.0, 4.0)
+TIMES = np.geomspace(0.01, 10.0, 60)
 # in every model, used or not, so that all share their code
 IN_SERIES = "wall_slip", "tool_compliance"
 
@@ -53,18 +51,10 @@ def at_stress(times, stress, strain=None):
     return Run("creep", times, protocol, np.zeros(len(times)), stress, strain=strain)
 
 
-def with_strain(protocol, strain):
-    knots = np.interp(protocol.table_times, TIMES, strain)
-    return replace(protocol, table_strains=jnp.asarray(knots))
-
-
 def predicted(declared, *runs, effects=(), **values):
     names = dict.fromkeys([*IN_SERIES, *effects])
     model = AugmentedModel(declared, [named_effects()[name] for name in names])
-    theta = model.zero()
-    for name, value in values.items():
-        theta[model.positions(name)[0]] = value
-    return model.predict(theta, make_batch(runs))
+    return model.predict(vector_of(model, **values), make_batch(runs))
 
 
 def test_what_needs_time_or_strain_does_not_act_on_steady_states():
@@ -123,28 +113,11 @@ def test_a_spectrum_over_five_decades_creeps_by_its_closed_form():
     assert np.max(np.abs(strain - stress * compliance)) < 5e-5 * strain[-1]
 
 
-def test_noise_in_a_strain_is_not_taken_for_flow():
-    protocol = imposed_stress(TIMES, np.full(60, 50.0))
-    strain = 20.0 * TIMES
-    noisy = strain + 2.0 * np.random.default_rng(0).standard_normal(60)
-    steps = [
-        len(stress_grid(with_strain(protocol, of), TIMES, 0.1))
-        for of in (0.0 * strain, strain, noisy)
-    ]
-    # flow does ask for steps
-    assert steps[1] > 1.5 * steps[0]
-    assert steps[2] < 1.1 * steps[1]
-
-
 def test_runs_of_every_kind_are_predicted_together_as_each_alone():
     rates, ones = np.geomspace(0.1, 10.0, 9), np.ones(60)
     strains, wave = np.array([0.1, 1.0, 10.0]), oscillatory_shear(1.0, 1.0)
     swing = after_alternation(wave, 2.0 * np.pi, TIMES)
-    sweep = Run(
-        "sweep", COUNTED, oscillations(strains, np.ones(3)), strains, np.ones(3), strain=strains,
-        storage_modulus=np.ones(3), loss_modulus=np.ones(3),
-    )  # fmt: skip
-    storage, loss = sweep.records
+    storage, loss = sweep_of(strains, np.ones(3)).records
     flows = {
         "start": start_up(2.0), "stretched": in_flow(start_up(0.6), "uniaxial"), "swing": swing,
         "step": after_step_strain(start_up(0.0), 2.0, first=float(TIMES[0])),
@@ -160,14 +133,6 @@ def test_runs_of_every_kind_are_predicted_together_as_each_alone():
         # where a cycle closes Newton's last step differs
         rtol = 1e-6 if run.name == "swing" else 1e-9
         np.testing.assert_allclose(row[: len(run)], predicted(declared, run)[0], rtol=rtol)
-
-
-def test_a_jump_of_stress_is_a_jump_and_a_wave_is_none():
-    creep = imposed_stress(TIMES, np.full(60, 5.0))
-    assert float(creep.begins) < 0.0
-    assert creep.quantity == "strain"
-    wave = imposed_stress(np.linspace(0.1, 6.0, 60), 5.0 * np.sin(np.linspace(0.1, 6.0, 60)))
-    assert float(wave.begins) == 0.0
 
 
 def test_a_protocol_of_samples_that_impose_no_rate_is_not_smoothed():

@@ -18,7 +18,6 @@ from discover.protocols import (
     imposed_stress,
     oscillations,
     oscillatory_shear,
-    start_up,
     steady_rates,
 )
 from discover.protocols.protocol import recording
@@ -37,11 +36,6 @@ def fluid(mobility=MOBILITY):
     return Fluid(Giesekus(mobility), MODULUS, TIME, SOLVENT)
 
 
-def of_fluid(flows):
-    """Return what is observed of all runs, in one program that can be differentiated."""
-    return jax.jit(lambda law: flows.over(partial(observed_on_grid, law)))(fluid())
-
-
 def test_creep_and_recovery_of_two_modes_are_those_of_scipy():
     exact = strain_at(LAW, [(0.0, 60.0), (6.0, 0.0)], SOLVENT, TIMES)
     found = observe(fluid(), imposed_stress(TIMES, STRESS), TIMES)[:, 0]
@@ -49,39 +43,19 @@ def test_creep_and_recovery_of_two_modes_are_those_of_scipy():
     assert np.linalg.norm(found - exact) < 5e-4 * np.linalg.norm(exact)
 
 
-# the largest strain, which sets the steps of all, is in both
-OTHER = oscillations(STRAINS[1:], np.full(2, FREQUENCY))
-SHOWN = [(SWEEP, "loss_modulus"), (OTHER, "storage_modulus"), (SWEEP, "storage_modulus")]
-
-
-@pytest.fixture(scope="module")
-def of_sweeps():
-    """Three runs of two sweeps, and what is observed of each."""
-    flows = lay_out([recording(*pair) for pair in SHOWN], [COUNTED, COUNTED[:2], COUNTED])
-    return flows, of_fluid(flows)[..., 0]
-
-
-def test_an_amplitude_sweep_is_where_scipy_ends(of_sweeps):
+def test_an_amplitude_sweep_is_where_scipy_ends():
+    flows = lay_out(
+        [recording(SWEEP, f"{name}_modulus") for name in ("loss", "storage")], [COUNTED] * 2
+    )
+    loss, storage = jax.jit(lambda law: flows.over(partial(observed_on_grid, law)))(fluid())[..., 0]
     exact = np.array([modulus_of(LAW, strain, FREQUENCY, 12) for strain in STRAINS])
     exact = exact + 1j * SOLVENT * FREQUENCY
-    loss, _, storage = of_sweeps[1]
     # steps of a strain of 0.4: 5e-6 was measured
     np.testing.assert_allclose(storage + 1j * loss, exact, rtol=2e-5)
     # many fluids at once are followed in steps of 0.1
     for modulus, wanted in (("storage_modulus", exact.real), ("loss_modulus", exact.imag)):
         found = observe(fluid(), recording(SWEEP, modulus), COUNTED)[:, 0]
         np.testing.assert_allclose(found, wanted, rtol=1e-6)
-
-
-def test_both_moduli_of_a_sweep_are_solved_for_once_and_each_run_has_its_own(of_sweeps):
-    flows, found = of_sweeps
-    protocols = [recording(*pair) for pair in SHOWN]
-    assert len(flows) == 3
-    assert flows.n_steps == lay_out(protocols[:2], [COUNTED, COUNTED[:2]]).n_steps
-    # of the other two scipy tells above
-    alone = of_fluid(lay_out(protocols[1:2], [COUNTED[:2]]))[0, :, 0]
-    # both end where Newton's next step would change 1e-8
-    np.testing.assert_allclose(found[1][: len(alone)], alone, rtol=1e-7)
 
 
 def swept(law, strains):
@@ -104,17 +78,6 @@ def test_a_strain_that_has_no_periodic_state_takes_no_other_of_a_sweep_with_it()
     # without the last strain the other two are found, in longer steps
     both = swept(runaway, strains[:2])
     np.testing.assert_allclose(both, alone[:2], rtol=1e-4)
-
-
-def test_steady_states_are_solved_for_once_each_however_many_samples_stand_beside_them():
-    rates, times = np.geomspace(0.1, 10.0, 5), np.linspace(0.01, 3.0, 200)
-    curve, counted = steady_rates(rates), np.arange(1.0, 6.0)
-    flows = lay_out([curve, start_up(1.0)], [counted, times])
-    number = {protocols.control: grids.times.size for protocols, grids in flows.parts}
-    assert number["steady"] == 5
-    found, _ = of_fluid(flows)
-    np.testing.assert_allclose(found[:5], observe(fluid(), curve, counted), rtol=1e-12)
-    np.testing.assert_array_equal(found[5:], np.broadcast_to(found[4], found[5:].shape))
 
 
 @pytest.mark.parametrize(

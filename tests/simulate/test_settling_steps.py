@@ -1,19 +1,23 @@
-"""Steps that grow where the flow has become steady, against full tensors by scipy."""
+"""Steps in time: they grow where a flow is steady, and are cut where chains retract."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, JohnsonSegalman, Structured, WhiteMetzner, steps
+from independent import Giesekus, JohnsonSegalman, RoliePoly, Structured, WhiteMetzner, steps
+from independent.homogeneous import UNIT
+from scipy.integrate import solve_ivp
+from vectors import vector_of
 
 from discover.dataset import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.grid import STRAIN_STEP, make_grid
-from discover.forward.of_fluids import bare_run, observed, observed_in
+from discover.forward.of_fluids import bare_run, observed, observed_in, pieces_in_time
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
-from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up, step_rates
+from discover.protocols import shear_rates, start_up, step_rates
+from discover.simulate import simulate
 from tensor_library.law_terms import LawTerms
 
 TIME = 0.4
@@ -83,35 +87,13 @@ def test_steps_that_grow_before_an_oscillation_has_died_out_are_seen_to_be_off()
     assert error("johnson_segalman", TIME, TIME / 8)[0] > 4e-6
 
 
-def test_oscillations_and_unsteady_rates_keep_their_steps():
-    times = np.linspace(0.0, 20.0, 400)
-    for flow in (
-        oscillatory_shear(4.0, 1.0),
-        measured_rate(times, 4.0 * np.cos(times)),
-        measured_rate(times, np.geomspace(10.0, 0.01, times.size)),
-    ):
-        plain, _ = make_grid(flow, times)
-        grown, _ = make_grid(flow, times, relaxation_time=1e-3)
-        np.testing.assert_array_equal(grown, plain)
-
-
-def test_no_step_is_longer_than_the_method_is_stable_for():
-    grid, index = make_grid(FLOW, TIMES, relaxation_time=TIME)
-    np.testing.assert_array_equal(grid[index], TIMES)
-    fast = grid[:-1] >= RATES[0][1]
-    assert np.max(np.diff(grid)[fast]) <= 1.0 / RATES[1][1] + 1e-12
-    # and some are as long
-    assert np.max(np.diff(grid)[fast]) > 0.9 / RATES[1][1]
-
-
 def test_a_structure_slower_than_the_relaxation_is_followed_in_long_steps():
     name, critical, build_up, slowness, share = (
         "thixotropic_relaxation_two_times", 0.7, 1.5, 8.0, 0.3,
     )  # fmt: skip
     declared = DeclaredModel.named("giesekus", {"alpha": 0.2}, 100.0, TIME)
     model = AugmentedModel(declared, [named_effects()[name]])
-    theta = model.zero()
-    theta[model.positions(name)] = 1.0 / critical, build_up, slowness, share
+    theta = vector_of(model, **{name: (1.0 / critical, build_up, slowness, share)})
     run = Run("step", TIMES, FLOW, shear_rates(FLOW, TIMES), np.ones(len(TIMES)))
     batch = make_batch([run])
     exact = Structured(
@@ -125,3 +107,55 @@ def test_a_structure_slower_than_the_relaxation_is_followed_in_long_steps():
     np.testing.assert_allclose(
         model.predict(theta, batch)[0], exact, atol=2e-3 * np.max(np.abs(exact))
     )
+
+
+MODULUS, CHAIN_TIMES = (1000.0, 300.0, 100.0), (1e-3, 0.1, 10.0)
+SAMPLES = np.linspace(0.5, 30.0, 60)
+RUN = bare_run(start_up(0.3), SAMPLES)
+
+
+def exact(ratio, rate):
+    """Return σ12 of three modes in Pa, on full tensors, by an implicit method."""
+    total = np.zeros(len(SAMPLES))
+    for modulus, time in zip(MODULUS, CHAIN_TIMES, strict=True):
+        law = RoliePoly(0.5, ratio * time, modulus=modulus, relaxation_time=time)
+        gradient = rate * UNIT["shear"]
+        found = solve_ivp(
+            lambda t, y, law=law, gradient=gradient: law.change(y, gradient),
+            (0.0, SAMPLES[-1]), law.rest(), "Radau", SAMPLES, rtol=1e-8, atol=1e-10,
+        )  # fmt: skip
+        total += [law.stress(state, gradient)[0, 1] for state in found.y.T]
+    return total
+
+
+def fluid(ratio):
+    law = make_law("rolie_poly", {"stretch_time_ratio": ratio, "beta": 0.5})
+    return Fluid(law, MODULUS, CHAIN_TIMES)
+
+
+def test_steps_much_longer_than_a_mode_and_its_retraction_follow_both():
+    """The fastest mode relaxes in 1/500 of a step, and retracts in 1/5,000; it ran away."""
+    wanted = exact(0.1, 0.3)
+    found = observed_in(fluid(0.1), start_up(0.3), SAMPLES)[:, 0]
+    np.testing.assert_allclose(found, wanted, atol=1e-3 * np.max(wanted))
+
+
+@pytest.mark.slow
+def test_steps_that_adapt_follow_them_to_the_tolerance():
+    wanted = exact(0.1, 0.3)
+    adapted = simulate(fluid(0.1), start_up(0.3), SAMPLES).shear_stress
+    np.testing.assert_allclose(adapted, wanted, atol=1e-6 * np.max(wanted))
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.5])
+def test_steps_are_cut_until_cutting_them_changes_nothing(ratio):
+    pieces = pieces_in_time(fluid(ratio), [RUN], 0.2)
+    found = observed_in(fluid(ratio), start_up(0.3), SAMPLES, 0.2, pieces=pieces)[:, 0]
+    wanted = exact(ratio, 0.3)
+    # a change of 1e-4 on halving bounds the error of a method that converges
+    assert np.linalg.norm(found - wanted) < 2e-4 * np.linalg.norm(wanted)
+    assert pieces < 10
+
+
+def test_a_law_that_does_not_retract_keeps_its_steps():
+    assert pieces_in_time(Fluid(make_law("giesekus", {"alpha": 0.3}), 1.0, 1.0), [RUN], 0.2) == 1

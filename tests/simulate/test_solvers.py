@@ -2,7 +2,6 @@ import independent
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from discover.errors import InputError
 from discover.forward import make_batch
@@ -20,31 +19,12 @@ from discover.protocols import (
 from discover.simulate import simulate, synthetic_dataset
 
 EXPONENTIAL = make_law("ptt_exponential", {"epsilon": 0.4})
-SPECTRUM = (np.logspace(5, 3, 13), np.logspace(-3, 4, 13))  # 1 ms to 10,000 s
 
 
 def by_scipy(law, flow, times):
     """Return σ12, N1 and N2, to 1e-9."""
     found = law.respond(flow, times)
     return np.stack([found.sigma12, found.N1, found.N2], axis=-1)
-
-
-@pytest.mark.slow
-def test_stiff_nonlinear_spectrum_agrees_with_an_implicit_scipy_method():
-    fluid = Fluid(Giesekus(0.3), *SPECTRUM)
-    rate, times = 0.02, np.concatenate([[0.0], np.logspace(-2, 3, 30)])
-    total = np.zeros((len(times), 4))
-    for g, lam in zip(*SPECTRUM, strict=True):  # modes do not talk to each other
-        law = independent.Giesekus(0.3, g, lam)
-        solution = solve_ivp(
-            lambda _, stress, law=law: law.change(stress, rate), (0, times[-1]), law.rest(),
-            t_eval=times, method="Radau", rtol=1e-9, atol=1e-11 * g,
-        )  # fmt: skip
-        total += solution.y.T[:, [0, 4, 8, 1]]
-    ours = simulate(fluid, start_up(rate), times).components
-    np.testing.assert_allclose(ours, total, atol=2e-6 * np.abs(total).max())
-    on_grid = observed_in(fluid, start_up(rate), times)
-    np.testing.assert_allclose(on_grid[:, 0], total[:, 3], atol=2e-6 * np.abs(total).max())
 
 
 def test_the_exponential_method_converges_at_fourth_order():
@@ -110,13 +90,6 @@ def test_a_law_that_runs_away_on_a_grid_gives_no_error_and_no_finite_number():
     law = make_law("giesekus", {"alpha": 0.2})
     bad = Fluid.dimensionless(law.__class__(-5.0))
     assert not np.all(np.isfinite(observed_in(bad, flow, times)))
-
-
-def test_grids_hold_every_sample_and_respect_the_limits():
-    flow, times = oscillatory_shear(2.0, 3.0), np.array([0.013, 0.5, 0.51, 4.0])
-    grid, index = make_grid(flow, times, strain_step=0.1, phase_step=0.15)
-    np.testing.assert_array_equal(grid[index], times)
-    assert np.max(np.diff(grid)) <= min(0.1 / 2.0, 0.15 / 3.0) + 1e-12
 
 
 def test_an_absurd_run_is_refused_before_it_is_integrated():

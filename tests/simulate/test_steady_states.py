@@ -10,7 +10,6 @@ from scipy.optimize import brentq
 
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.grid import make_grid
 from discover.forward.of_fluids import observed_in
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
@@ -134,12 +133,3 @@ def test_the_stress_before_a_step_is_that_of_the_steady_flow_with_and_without_it
     exact = law.respond(steps([0.0, held], [BEFORE, AFTER]), held + TIMES).sigma12
     # in steps of a strain of one throughout, the first case is off by 35 %
     np.testing.assert_allclose(found, exact, atol=(2e-5 if told else 1e-3) * exact[0])
-
-
-@pytest.mark.parametrize(("time", "most", "strain"), [(None, 1400, 0.25), (6.0, 450, 1.0)])
-def test_steady_flow_before_a_run_takes_some_hundred_steps(time, most, strain):
-    flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
-    grid, _ = make_grid(flow, TIMES, relaxation_time=time)
-    before = np.diff(grid[grid <= 0.0])
-    assert before.size < most
-    assert np.max(before) <= strain / BEFORE + 1e-12

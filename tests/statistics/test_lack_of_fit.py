@@ -1,11 +1,12 @@
-"""What a model leaves, judged: noise, something more, or of records that hold nothing."""
+"""A residual that looks like noise from run to run, or at the same place in all: lack of fit."""
 
 import numpy as np
 import pytest
 
 from discover.statistics import lack_of_fit
 from discover.statistics.noise import whiteness
-from discover.statistics.residual import Expectation
+from discover.statistics.noise.whiteness import noise_probability, same_place_probability
+from discover.statistics.residual import Expectation, noise_floor
 
 SAMPLES = 300
 TIMES = np.linspace(0.1, 60.0, SAMPLES)
@@ -128,3 +129,73 @@ def test_a_pattern_that_the_sweep_excuses_is_explained_and_yet_no_noise(error):
     plain = lack_of_fit([noise], [WAVE], Expectation(linear_error=error))
     assert plain.verdict == "explained"
     assert plain.probability > whiteness.SIGNIFICANCE
+
+
+NOISE, LENGTH = 0.01, 61
+
+
+def noise(seed: int) -> np.ndarray:
+    return NOISE * np.random.default_rng(seed).standard_normal((5, LENGTH))
+
+
+def newtonian_missed_at_the_start(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A viscous fluid, at once at its stress, and a Maxwell fluid of short memory from zero."""
+    rates = np.array([[0.1], [0.3], [1.0], [3.0], [10.0]])
+    measured = 5.0 * rates * (1.0 + noise(seed))
+    predicted = 5.0 * rates * (1.0 - np.exp(-np.linspace(0.0, 1e4, LENGTH)))
+    return predicted - measured, measured
+
+
+@pytest.mark.parametrize("runs", [1, 5])
+def test_a_start_that_every_run_misses_is_no_noise(runs):
+    residual, measured = newtonian_missed_at_the_start()
+    left = lack_of_fit([*residual[:runs]], [*measured[:runs]])
+    assert left.verdict == "unexplained"
+    assert left.outliers == 0
+    # of 61 samples in one run the size is known to 10 %, to half of that in five
+    assert left.noise == pytest.approx(NOISE, rel=0.25)
+
+
+def test_without_the_start_noise_is_left():
+    residual, measured = newtonian_missed_at_the_start()
+    assert lack_of_fit([*residual[:, 1:]], [*measured[:, 1:]]).verdict == "explained"
+
+
+def test_a_loud_start_that_differs_from_run_to_run_is_noise():
+    # the level of the test is 0.01; more than 3 of 40 has a probability below 1e-3
+    taken = 0
+    for seed in range(40):
+        loud = noise(seed)
+        loud[:, :3] *= 15.0
+        taken += same_place_probability([*loud]) <= 0.01
+    assert taken <= 3
+
+
+@pytest.mark.parametrize(
+    ("places", "verdict", "outliers"),
+    [((7, 19, 30, 41, 52), "explained", 5), ((30,) * 5, "unexplained", 0)],
+)
+def test_knocks_at_different_places_are_outliers_and_at_one_place_structure(
+    places, verdict, outliers
+):
+    left = noise(1)
+    left[np.arange(5), places] += 0.5
+    told = lack_of_fit([*left], [*(1.0 - left)])
+    assert (told.verdict, told.outliers) == (verdict, outliers)
+
+
+def test_few_samples_do_not_hide_a_misfit_in_the_noise():
+    # start-ups of Maxwell fluids against one of other times, eight samples each
+    times = np.linspace(0.0, 5.0, 8)
+    record = 1.0 - np.exp(-times)
+    size = np.sqrt(np.mean(record**2))
+    missed = [(np.exp(-times) - np.exp(-times / other)) / size for other in (0.5, 1.5, 2.0, 3.0)]
+    floors = []
+    for seed in range(20):
+        noise = NOISE * np.random.default_rng(seed).standard_normal((4, 8))
+        rows = missed + noise
+        probability = noise_probability(rows)
+        floors.append(noise_floor([*rows], probability))
+        assert not Expectation().explains([*rows], probability, floors[-1])
+    # 16 differences tell it to 40 %, the mean of 20 draws to 9 %; the bends of the misfit add some
+    assert np.mean(floors) < 1.5 * NOISE

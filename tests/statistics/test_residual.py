@@ -136,16 +136,6 @@ def test_plain_noise_of_short_runs_is_taken_for_structure_as_seldom_as_the_level
     assert taken <= 3 + 3 * np.sqrt(300 * 0.01 * 0.99)
 
 
-def test_few_short_runs_of_noise_are_explained():
-    records = [np.ones(12)] * 3
-    verdicts = [
-        lack_of_fit(list(noise_short(np.random.default_rng(seed), 3, 12)), records).verdict
-        for seed in range(60)
-    ]
-    # 1 % of 60: more than 4 has a probability below 1e-3
-    assert verdicts.count("explained") >= 56
-
-
 def test_six_runs_of_fifteen_samples_show_a_misfit_as_large_as_their_noise():
     # start-ups of Maxwell fluids of the same viscosity, one 2 times as slow
     misfit = np.exp(-TIMES / 2.0) - np.exp(-TIMES)
