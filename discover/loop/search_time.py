@@ -34,8 +34,6 @@ _WEIGHED, _WEIGHED_ALONE = _Part(175.0, share=1.05), _Part(15.0)
 # with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
 # two-mode PTT and noise. Seconds are those of the machine of `slowness`.
 _CURVES, _BANDS = _Part(2.0, 0.1), _Part(70.0, 0.1, 1.2, 0.43)
-# What is weighed after the second search, with more constants, over that after the first
-_SECOND = 1.4
 # Share of what follows a search where no effect is the likeliest: few hypotheses are near
 _FEW_NEAR = 0.2
 # Least share of the time that fits are taken to have had, the rest being seconds besides
@@ -139,7 +137,8 @@ class SearchTime:
     def _expect(self, fits: float) -> None:
         """Set what is to come of this search, so many fits and what weighs them."""
         self._to_come, self._size = fits, self._done - self._before + fits
-        self._weigh = self._of(self._weighing) * (1.0 if self._searches < 2 else _SECOND)
+        # the second search is weighed only where it is the likelier
+        self._weigh = self._of(self._weighing) if self._searches < 2 else 0.0
 
     def _of(self, part: _Part) -> float:
         return self._near * min(part.fits, part.share * self._size)

@@ -1,11 +1,13 @@
 """Search among hypotheses: sets of effects, from the simplest on, with exchange and steps back."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.priors import Priors
 
 _BEAM = 3
 _REFITTED = 8
@@ -31,12 +33,18 @@ class Search:
     """Hypotheses that were fitted, by the set of their effects.
 
     `fitter`: what fits them. `most`: effects in one set. `say`: called with a line of text now and
-    then.
+    then. `known`: hypotheses that another search fitted, which are not fitted again.
     """
 
-    def __init__(self, fitter: Fitter, most: int = 3, say: Callable[[str], None] | None = None):
+    def __init__(
+        self,
+        fitter: Fitter,
+        most: int = 3,
+        say: Callable[[str], None] | None = None,
+        known: Mapping[Key, Fit] | None = None,
+    ):
         self.fitter, self.problem, self.most = fitter, fitter.problem, most
-        self.say = say or (lambda line: None)
+        self.say, self._known = say or (lambda line: None), known or {}
         self.found: dict[Key, Fit] = {}
         self._taken_out: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
 
@@ -58,7 +66,16 @@ class Search:
 
         `wanted`: so many of the best are asked for; what cannot come near them is given up.
         """
-        fits = self.fitter.fit(list(starts), wanted=wanted, known=self.found.values())
+        asked, before = [], {*self.found}
+        for start in starts:
+            key = frozenset(start.names)
+            fit = self._known.get(key)
+            # one that was given up is fitted where it is asked for once more
+            if fit is None or (fit.root is None and key in before):
+                asked.append(start)
+            else:
+                self.found.setdefault(key, fit)
+        fits = self.fitter.fit(asked, wanted=wanted, known=self.found.values())
         for fit in fits:
             key = frozenset(fit.names)
             known = self.found.get(key)
@@ -236,3 +253,22 @@ def refitted(fits: Sequence[Fit], fitter: Fitter) -> Search:
     search = Search(fitter)
     search.add([fitter.start(fit.names, fit.theta) for fit in fits])
     return search
+
+
+def without_by_mode(search: Search, fitter: Fitter) -> dict[Key, Fit]:
+    """Return what a search found that has no constant by mode, for another fitter of its rows.
+
+    The problems differ in which constants are by mode.
+    """
+    old, new = search.problem, fitter.problem
+    differ, first = {*old.declared.by_mode, *new.declared.by_mode}, old.declared.size
+    if differ - {effect.name for effect in old.candidates}:
+        return {}  # every hypothesis has one
+    shift, found = new.declared.size - first, {}
+    for key, fit in search.found.items():
+        if key.isdisjoint(differ):
+            theta, of_law = new.zero.copy(), 2 + len(old.declared.free_parameters)
+            theta[:of_law], theta[first + shift :] = fit.theta[:of_law], fit.theta[first:]
+            priors = {at if at < first else at + shift: own for at, own in fit.priors.items()}
+            found[key] = replace(fit, theta=theta, priors=Priors(priors), memory={**fit.memory})
+    return found
