@@ -15,7 +15,7 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flows import RateSteps
+from discover.forward.rate_steps import RateSteps
 from discover.loop.measured_rates import with_places, with_rate_steps
 from discover.report.loop import loop_verdict
 

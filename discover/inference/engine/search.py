@@ -1,6 +1,7 @@
 """Search among hypotheses: sets of effects, from the simplest on, with exchange and steps back."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -47,6 +48,12 @@ class Search:
         self.say, self._known = say or (lambda line: None), known or {}
         self.found: dict[Key, Fit] = {}
         self._taken_out: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
+
+    def copied(self) -> "Search":
+        """Return a search that goes on from here, while this one stays as it is."""
+        other = copy(self)
+        other.found, other._taken_out = {**self.found}, {*self._taken_out}
+        return other
 
     def rank(self, fit: Fit) -> float:
         """Return the log of evidence times prior."""
@@ -108,8 +115,8 @@ class Search:
             if not starts:
                 break
             best = max(map(self.rank, self.found.values()))
-            self.add(starts, wanted=_BEAM)
-            self.say(f"sets of {depth + 1}: {len(new)} fitted, likeliest: {self._likeliest}")
+            fitted = {fit.names for fit in self.add(starts, wanted=_BEAM)}
+            self.say(f"sets of {depth + 1}: {len(fitted)} fitted, likeliest: {self._likeliest}")
             level = sorted((self.found[key] for key in new), key=self.rank, reverse=True)[:_BEAM]
             level = [fit for fit in level if np.isfinite(self.rank(fit))]
             if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
@@ -117,7 +124,8 @@ class Search:
         self.backwards()
         self.exchange()
         self.backwards()
-        self.say(f"exchanged: {len(self.found)} sets, likeliest: {self._likeliest}")
+        own = len(self.found.keys() - self._known.keys())
+        self.say(f"exchanged: {own} sets, likeliest: {self._likeliest}")
         return self
 
     def scored(self, fit: Fit, every_start: bool = False) -> list[Fit]:
