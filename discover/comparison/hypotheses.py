@@ -87,7 +87,7 @@ def with_proposals(
 
     A learner's terms stand beside the instrument of the likeliest hypothesis.
     """
-    search, problem = found.posterior.search, found.posterior.problem
+    search, problem = found.posterior.search.copied(), found.posterior.problem
     alive = search.alive()
     if not alive:
         return found, {name: Proposed(tuple(some)) for name, some in terms.items()}

@@ -24,6 +24,16 @@ def first_order_lag(times: Signal, values: Signal, time_constant: OfRun) -> Sign
 
     `times`, `time_constant` (τ) in s. At τ = 0, y = x, also at the first time.
     """
+    if isinstance(values, np.ndarray):
+        each = np.broadcast_arrays(times, values, time_constant)
+        found, own, lag = (of.reshape(-1, of.shape[-1]) for of in (each[1].copy(), *each[::2]))
+        moved = np.flatnonzero(lag[:, 0] > 0.0)
+        found[moved] = _lagged(own[moved], found[moved], lag[moved, :1])
+        return found.reshape(each[1].shape)
+    return _lagged(times, values, time_constant)
+
+
+def _lagged(times: Signal, values: Signal, time_constant: OfRun) -> Signal:
     of: Any = values.__array_namespace__()
     active = time_constant > 0.0
     safe = of.where(active, time_constant, 1.0)

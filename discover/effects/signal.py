@@ -240,8 +240,11 @@ class TimeDelay(SignalEffect):
         if not isinstance(record.stress, np.ndarray):
             return jnp.interp(earlier, record.instrument_times, record.stress, left=0.0)
         each = np.broadcast_arrays(earlier, record.instrument_times, record.stress)
-        rows = zip(*(of.reshape(-1, of.shape[-1]) for of in each), strict=True)
-        return np.stack([np.interp(*row, left=0.0) for row in rows]).reshape(earlier.shape)
+        asked, times, stress = (of.reshape(-1, of.shape[-1]) for of in each)
+        found = stress.copy()
+        for row in np.flatnonzero(asked[:, 0] != times[:, 0]):
+            found[row] = np.interp(asked[row], times[row], stress[row], left=0.0)
+        return found.reshape(earlier.shape)
 
     def response(self, values, frequency):
         return jnp.exp(-1j * frequency * values[0])

@@ -14,7 +14,8 @@ from jaxtyping import Float
 from discover.effects import AbstractEffect
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
 from discover.forward.flows import Batch
-from discover.forward.program import Predictor, Trials, program_of
+from discover.forward.predictor import Predictor, Trials
+from discover.forward.program import program_of
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5

@@ -2,97 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
+from discover.forward.pieces import in_pieces
+from discover.forward.rate_steps import RateSteps, rate_steps
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
-
-_NEVER = -1.0
-
-
-class RateSteps(eqx.Module):
-    """Steps of the rate between two samples, with a leading axis of runs.
-
-    `start`, `end`: times of the samples in s; padding lies before any record. `share`: of the
-    interval at whose end the rate steps, where not fitted. `place`: of its fitted share; −1 where
-    not fitted.
-    """
-
-    start: Float[Array | np.ndarray, "*runs steps"]
-    end: Float[Array | np.ndarray, "*runs steps"]
-    change: Float[Array | np.ndarray, "*runs steps"]  # of the rate in 1/s
-    share: Float[Array | np.ndarray, "*runs steps"]
-    place: Int[Array | np.ndarray, "*runs steps"]
-
-    def in_rate(
-        self, rate: Float[Array, " m"], times: Float[Array, " m"], fitted: Float[Array, " fitted"]
-    ) -> Float[Array, " m"]:
-        """Return the rate of one run with its steps where they happen.
-
-        Between the two samples Simpson's rule gives the strain of each step of the integration, so
-        that rates change smoothly with the instant. `rate`, `times`: at ends and middles of steps
-        in turn, in 1/s and s, with a straight line where the rate steps. `fitted`: the fitted
-        shares.
-        """
-        share = self.share
-        if fitted.shape[0]:
-            share = jnp.where(self.place < 0, share, fitted[self.place])
-        instant = self.start + share * (self.end - self.start)
-        ends = times[::2]
-        first, last = ends[:-1], ends[1:]
-        # of the two steps that meet at an end; beyond those of the record there is none
-        reach = jnp.concatenate([jnp.ones(1), ends[2:] - ends[:-2], jnp.ones(1)])
-
-        def added(start, end, change, instant):
-            at_ends = jnp.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
-            at_ends = jnp.where(ends <= start, 0.0, jnp.where(ends >= end, 1.0, at_ends))
-            strain = jnp.clip((last - instant) / (last - first), 0.0, 1.0)
-            in_middle = 1.5 * strain - 0.25 * (at_ends[:-1] + at_ends[1:])
-            stepped = jnp.zeros_like(times).at[::2].set(at_ends).at[1::2].set(in_middle)
-            straight = jnp.clip((times - start) / (end - start), 0.0, 1.0)
-            between = (times > start) & (times < end)
-            return change * jnp.where(between, stepped - straight, 0.0)
-
-        return rate + jnp.sum(jax.vmap(added)(self.start, self.end, self.change, instant), axis=0)
-
-    def padded(self, count: int) -> "RateSteps":
-        """Return as many steps of each run as asked for; those beyond its own never happen."""
-        beyond = ((0, 0), (0, count - self.start.shape[1]))
-        columns = (self.start, self.end, self.change, self.share, self.place)
-        fills = (_NEVER - 1.0, _NEVER, 0.0, 0.5, -1)
-        return RateSteps(
-            *(
-                np.pad(np.asarray(column), beyond, constant_values=fill)
-                for column, fill in zip(columns, fills, strict=True)
-            )
-        )
-
-
-def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
-    """Return the steps of runs whose instants are fitted or were; None where there is none."""
-    most = max(len(run.rate_steps) for run in runs)
-    if not most:
-        return None
-    rows = np.full((len(runs), most, 4), [_NEVER - 1.0, _NEVER, 0.0, 0.5])
-    place = np.full((len(runs), most), -1)
-    for i, run in enumerate(runs):
-        for k, step in enumerate(run.rate_steps):
-            rows[i, k] = step.start, step.end, step.change, step.share
-            place[i, k] = -1 if step.place is None else step.place
-    start, end, change, share = np.moveaxis(rows, -1, 0)
-    return RateSteps(start, end, change, share, place)
-
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
 _EARLY_STEPS = 0.5 ** np.arange(6)
@@ -100,10 +24,6 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
-
-# Steps in a row that are pieces of fewer: how many at least, into how many of one length they go,
-# how far their widths may differ for rounding, and rates from a straight line
-_MANY_IN_A_ROW, _SHARES, _ALIKE, _STRAIGHT = 8, 4, 1e-6, 1e-10
 
 # Least sizes of arrays that data sets share; of runs where they have no more steps than that
 _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
@@ -209,7 +129,7 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         if settles is None and len(grid) > max(_LONG, 2 * len(anchors)):
             grid, _ = make_grid(run.protocol, anchors, growth=_GROWTH, **limits)
         grid, index = cut(grid, np.searchsorted(grid, run.time), int(pieces))
-        grids.append(_in_pieces(grid, index, run))
+        grids.append(in_pieces(grid, index, run))
     n_steps = max(2, *(len(grid) for grid, *_ in grids))
     n_samples = max(len(run) for run in runs)
     cycles = [
@@ -249,38 +169,6 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         steps=rate_steps(runs),
         cycle_steps=cycle_steps,
     )
-
-
-def _in_pieces(
-    grid: Float[np.ndarray, " s"], index: Int[np.ndarray, " n"], run: Run
-) -> tuple[Float[np.ndarray, " m"], Int[np.ndarray, " n"], Int[np.ndarray, " pieces"]]:
-    """Return steps of which several in a row of a grid are pieces, and where samples stand.
-
-    Those are of one length, between two samples, and the commanded rate is a straight line in them.
-    The pieces of a step double in number, for it may begin with a jump, up to a share of them all.
-    """
-    if len(grid) < _MANY_IN_A_ROW:
-        return grid, index, np.ones(len(grid) - 1, np.int64)
-    width, rate = np.diff(grid), shear_rates(run.protocol, grid)
-    in_a_row = np.abs(np.diff(width)) <= _ALIKE * width[1:]
-    bend = np.abs(rate[2:] - 2.0 * rate[1:-1] + rate[:-2])
-    in_a_row &= bend <= _STRAIGHT * (np.abs(rate[2:]) + np.abs(rate[:-2]))
-    in_a_row = np.concatenate([[False], in_a_row, [False]])
-    in_a_row[index] = False
-    for step in run.rate_steps:  # one that is fitted is no straight line
-        in_a_row[(grid >= step.start) & (grid <= step.end)] = False
-    ends = np.flatnonzero(~in_a_row)
-    kept = ~in_a_row
-    for first, end in pairwise(ends):
-        if end - first < _MANY_IN_A_ROW:
-            kept[first:end] = True
-            continue
-        place, most = first, (end - first) // _SHARES
-        while place < end:
-            kept[place] = True
-            place += min(max(place - first, 1), most)
-    places = np.flatnonzero(kept)
-    return grid[places], np.searchsorted(places, index), np.diff(places)
 
 
 class StressFlows(eqx.Module):

@@ -17,7 +17,8 @@ from discover.dataset.run import COLUMN_OF, Run
 from discover.forward.declared import DeclaredModel, Structure
 from discover.forward.flows import Batch, PeriodicFlows, make_batch
 from discover.forward.grid import STRAIN_STEP, had_gone_on
-from discover.forward.program import Predictor, Trials, program_of
+from discover.forward.predictor import Predictor, Trials
+from discover.forward.program import program_of
 from discover.forward.side_by_side import MadeOnce
 from discover.laws.each_mode import law_of_mode
 from discover.laws.expansion import in_shared_form

@@ -40,7 +40,7 @@ from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 
 
-@compiled
+@partial(compiled, runs_long=True)
 def with_sensitivities(
     law: LibraryExpansion, known: Fluid, flows: FlowBatch
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:

@@ -239,7 +239,7 @@ def search(task: Task, laws: Sequence[str] = ()) -> Found:
     Raises InputError as `Task.choose` and `Task.explained`.
     """
     declared, tried = task.choose(laws)
-    return Found(task, task.explained_by_mode(declared), tried)
+    return Found(task, task.explained(declared), tried)
 
 
 def without_fluid(posterior: Posterior) -> bool:

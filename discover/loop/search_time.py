@@ -34,8 +34,10 @@ _WEIGHED, _WEIGHED_ALONE = _Part(175.0, share=1.05), _Part(15.0)
 # with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
 # two-mode PTT and noise. Seconds are those of the machine of `slowness`.
 _CURVES, _BANDS = _Part(2.0, 0.1), _Part(70.0, 0.1, 1.2, 0.43)
-# What is weighed after the second search, with more constants, over that after the first
-_SECOND = 1.4
+# A fit of the second search, whose constants differ from mode to mode, over one of the first
+_BY_MODE = 2.0
+# What is weighed after it, which is only done where it is the likelier, over that after the first
+_WEIGHED_TOO = 0.6
 # Share of what follows a search where no effect is the likeliest: few hypotheses are near
 _FEW_NEAR = 0.2
 # Least share of the time that fits are taken to have had, the rest being seconds besides
@@ -73,7 +75,7 @@ class SearchTime:
         self._follows, self._near = several_modes, 1.0  # whether another search; few near: less
         self._done = self._seconds = 0.0  # fits, and seconds besides
         self._before, self._round_before = 0.0, (0.0, 0.0)  # those before this search, this round
-        self._searches, self._first = 0, 0.0  # of this round, and fits of the first once it is over
+        self._searches, self._each = 0, 1.0  # of this round, and a fit of it over one of the first
         self._depth = self._size = self._weigh = 0.0  # of this search; fits that weigh it
         self._to_come = self._fitted = 0.0  # fits of this search, and hypotheses so far
         self._exchanged: float | None = None
@@ -93,18 +95,18 @@ class SearchTime:
         elif found := re.search(r"sets of (\d+): (\d+) fitted", line):
             self._depth, fitted = map(float, found.groups())
             self._fitted += fitted
-            self._done += fitted * (1.0 if self._depth > 1 else _FIRST)
+            self._done += self._each * fitted * (1.0 if self._depth > 1 else _FIRST)
             exchanged = self._exchanged if self._near == 1.0 else 0.0
             self._expect(self._deeper * (self._most - self._depth) + (exchanged or 0.0))
         elif found := re.search(r"exchanged: (\d+)", line):
             self._exchanged = _EXCHANGE * max(float(found[1]) - self._fitted, 0.0)
-            self._done += self._exchanged
+            self._done += self._each * self._exchanged
             self._most = self._depth  # the next one goes as far
             self._expect(0.0)
         elif "from mode to mode" in line or "curves of" in line:
             self._done += self._to_come + self._weigh
             self._to_come = self._weigh = 0.0
-            self._first, self._follows = self._done - self._before, "curves of" not in line
+            self._follows = "curves of" not in line
         elif "bands" in line and self._reports:
             self._pass(self._reports[:-1])
             self._reports, self._in_last = self._reports[-1:], True
@@ -112,7 +114,9 @@ class SearchTime:
             return None
         fits = self._to_come + self._weigh
         if self._follows and self._searches < 2:
-            fits += self._first or self._done - self._before + fits
+            # which fits nothing again but what may differ by mode
+            fits += _BY_MODE * (self._deeper * max(self._most - 1, 0) + (self._exchanged or 0.0))
+            fits += _WEIGHED_TOO * self._of(self._weighing)
         fits += sum(map(self._of, self._reports))
         seconds = self._besides(self._reports)
         fits += (self._rounds - 1) * (self._done - self._round_before[0] + fits)
@@ -127,19 +131,21 @@ class SearchTime:
         if self._in_last:
             self._pass(self._reports)
             self._rounds, self._searches, self._in_last = self._rounds - 1, 0, False
-            self._round_before, self._first = (self._done, self._seconds), 0.0
+            self._round_before = self._done, self._seconds
         self._searches, self._before, self._fitted = self._searches + 1, self._done, 0.0
         if self._exchanged is None:
             self._exchanged = min(_EXCHANGED, _EACH * candidates)
         self._deeper = min(_DEEPER, _EACH * candidates)
         self._reports = self._reporting
-        first = _FIRST * candidates
+        self._each = 1.0 if self._searches < 2 else _BY_MODE
+        first = _FIRST * candidates if self._searches < 2 else 0.0
         self._expect(first + self._deeper * max(self._most - 1, 0) + self._exchanged)
 
     def _expect(self, fits: float) -> None:
         """Set what is to come of this search, so many fits and what weighs them."""
-        self._to_come, self._size = fits, self._done - self._before + fits
-        self._weigh = self._of(self._weighing) * (1.0 if self._searches < 2 else _SECOND)
+        self._to_come = self._each * fits
+        self._size = self._done - self._before + self._to_come
+        self._weigh = self._of(self._weighing) * (1.0 if self._searches < 2 else _WEIGHED_TOO)
 
     def _of(self, part: _Part) -> float:
         return self._near * min(part.fits, part.share * self._size)

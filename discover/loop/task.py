@@ -20,9 +20,10 @@ from discover.effects import (
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.forward.declared import may_differ_by_mode
-from discover.inference.engine import Posterior, Problem, explain
+from discover.inference.engine import Posterior, Problem
 from discover.inference.engine.fits import Fitter
-from discover.inference.engine.search import Search
+from discover.inference.engine.posterior import posterior_of
+from discover.inference.engine.search import Search, without_by_mode
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
@@ -115,41 +116,47 @@ class Task:
             declared, effects, self.fitted, runs, self.loading, self.noise, self.computed
         )
 
-    def explained(self, declared: DeclaredModel) -> Posterior:
-        """Return the posterior over what a declared model lacks.
+    def searched(self, declared: DeclaredModel, before: Search | None = None) -> Search:
+        """Return the search among what a declared model lacks.
 
-        Raises InputError if it cannot be integrated through the fitted runs.
+        `before`: one with other constants by mode, of which all is kept that does not depend on
+        these. Raises InputError if the model cannot be integrated through the fitted runs.
         """
         problem = self.problem(declared)
         self.say(f"search among {len(problem.candidates)} effects")
+        fitter = Fitter(problem, problem.fitted)
         # the model without any effect
-        if not np.all(np.isfinite(Fitter(problem, problem.fitted).predict([problem.zero]))):
+        if not np.all(np.isfinite(fitter.predict([problem.zero]))):
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
             )
-        return explain(problem, self.most, self.say)
+        known = {} if before is None else without_by_mode(before, fitter)
+        return Search(fitter, self.most, self.say, known).run()
 
-    def explained_by_mode(self, declared: DeclaredModel) -> Posterior:
-        """Return the posterior with constants that differ from mode to mode, if it is likelier.
+    def explained(self, declared: DeclaredModel) -> Posterior:
+        """Return the posterior over what a declared model lacks.
 
-        Of a model with several modes: those that it declares so, or else what was found and may
-        differ. Raises InputError as `explained`.
+        With constants that differ from mode to mode if it is then likelier: of a model with several
+        modes, those that it declares so, or else what was found and may differ. Raises InputError
+        as `searched`.
         """
-        first = self.explained(declared)
-        declared = first.problem.declared
-        if len(declared.modulus) < 2 or not first.explanations:
-            return first
+        first = self.searched(declared)
+        posterior = posterior_of(first)
+        if len(declared.modulus) < 2 or not posterior.explanations:
+            return posterior
         names = ()
         if not declared.by_mode:
-            found = first.explanations[0].members[0]
+            found = posterior.explanations[0].members[0]
             names = tuple(n for n in found if may_differ_by_mode(first.problem.effects[n]))
             if not names:
-                return first
+                return posterior
         self.say("constants that may differ from mode to mode")
-        second = self.explained(replace(declared, by_mode=names))
-        gain = 2.0 * (log_evidence(second.search) - log_evidence(first.search))
-        first.memory["by_mode"] = second.memory["by_mode"] = abs(gain)
-        return second if gain > 0.0 else first
+        second = self.searched(replace(declared, by_mode=names), first)
+        gain = 2.0 * (log_evidence(second) - log_evidence(first))
+        if gain > 0.0:
+            posterior = posterior_of(second)
+        posterior.memory["by_mode"] = abs(gain)
+        return posterior
 
     def choose(self, laws: Sequence[str]) -> tuple[DeclaredModel, dict[str, Search]]:
         """Return the declared model with the likeliest of some laws, and the search with each.

@@ -16,6 +16,9 @@ from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DEGREE
+from discover.inference.engine import Problem
+from discover.inference.engine.fits import Fitter
+from discover.inference.engine.search import Search, without_by_mode
 from discover.loop import DeclaredModel
 from discover.protocols import in_flow, start_up
 from discover.report.plots.loop.residual import by_mode_picture
@@ -241,3 +244,29 @@ def test_control_one_constant_that_explains_the_runs_stays_one():
     assert result.differing_by_mode == ()
     low, high = result.stages[0].parameters["alpha"].ci95
     assert low < 0.3 < high
+
+
+def test_a_search_with_constants_by_mode_fits_nothing_again_that_has_none(monkeypatch):
+    gain, mobility = "stress_gain", "giesekus_mobility"
+    fitters = [
+        Fitter(problem, problem.fitted)
+        for by_mode in ((), (mobility,))
+        for declared in [DeclaredModel.maxwell(MODULI, TIMES, by_mode=by_mode)]
+        for effects in [[make_effect(mobility), make_effect(gain)]]
+        for problem in [Problem(declared, effects, data((0.1, 0.3, 0.6)).runs)]
+    ]
+    first, fitter = Search(fitters[0], most=2).run(), fitters[1]
+    known = without_by_mode(first, fitter)
+    assert set(known) == {frozenset(), frozenset({gain})}
+    predicted = fitter.predict([fit.theta for fit in known.values()])
+    # the same fluid by other code, to rounding
+    np.testing.assert_allclose(predicted, [fit.predicted for fit in known.values()], rtol=1e-9)
+    fitted, fit = [], fitter.fit
+    monkeypatch.setattr(
+        fitter, "fit", lambda starts, **how: fit(fitted.extend(starts) or starts, **how)
+    )
+    second = Search(fitter, most=2, known=known).run()
+    assert {mobility in start.names for start in fitted} == {True}
+    assert {*second.found} == {*first.found}
+    # each mode has a constant of its own here
+    assert second.alive()[0].log_evidence > first.alive()[0].log_evidence + 100.0

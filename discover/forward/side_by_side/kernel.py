@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.pieces import FEWEST, STEADY
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.code import as_array as _array
 from discover.forward.side_by_side.cycles import Cycles
@@ -28,10 +29,6 @@ _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 # that is carried from step to step
 _TAKEN, _SUM, _OTHER_SUM, _BEGIN, _MOVED, _STATE = range(6)
 _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
-
-# Pieces of a step from which on it may end early, and by how much a state may then still change
-# until its end: nothing that is seen, as a steady state comes nearer with every piece
-_FEWEST, _STEADY = 8, 1e-9
 
 # A stress over its modulus, and a state of the fluid, of which changes are no longer relative
 _SMALL, _SMALL_STATE = 1e-3, 1e-2
@@ -169,7 +166,7 @@ class Kernel(Code):
         )  # fmt: skip
         several = b.icmp_signed(">", count, INTEGER(1))
         changes = a.in_some(a.compare("!=", rates[0], rates[2]))
-        may_end = b.and_(b.icmp_signed(">=", count, INTEGER(_FEWEST)), b.not_(changes))
+        may_end = b.and_(b.icmp_signed(">=", count, INTEGER(FEWEST)), b.not_(changes))
         self._keep(0.0, _BEGIN)
         b.store(INTEGER(1), self._moves)
 
@@ -195,7 +192,7 @@ class Kernel(Code):
             self._keep(end, _BEGIN)
             with b.if_then(may_end), a.apart():
                 left = a.divide(a.subtract(1.0, end), share)
-                some = a.in_some(a.compare(">", a.multiply(self._moved(), left), _STEADY))
+                some = a.in_some(a.compare(">", a.multiply(self._moved(), left), STEADY))
                 b.store(b.zext(some, INTEGER), self._moves)
         self._record(run, number, is_run)
 

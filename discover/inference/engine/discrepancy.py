@@ -277,12 +277,15 @@ class Discrepancy:
             total, logs, *_ = self._products(correlation)
             known = np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
             least = self.fitter.noise.least(self.record, self._noise(correlation))
+            parts: dict[bool, np.ndarray] = {}  # with terms, and without
             for terms, scatter in product(TERMS, SCATTERS):
                 scale, differ = self._scale(terms, scatter)
                 # what was left last: its pivot is the square that columns and curves do not take
                 used = np.append(np.flatnonzero(scale) + 1, 0)
                 scale = np.append(scale[scale > 0], 1.0)
-                matrix = scale[:, None] * total[:, used[:, None], used] * scale
+                if bool(terms) not in parts:
+                    parts[bool(terms)] = total[:, used[:, None], used]
+                matrix = scale[:, None] * parts[bool(terms)] * scale
                 at = np.arange(len(used) - 1)
                 matrix[:, at, at] += 1.0
                 matrix[:, -1, -1] += least

@@ -134,7 +134,7 @@ class Fitter:
         empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
         return Fit(tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty)
 
-    def _set(self, fits: Sequence[Fit], predicted: Float[np.ndarray, "fits rows"]) -> None:
+    def _set(self, fits: Sequence[Fit], predicted: Sequence[Float[np.ndarray, " rows"]]) -> None:
         """Set what predictions of the model say of hypotheses."""
         for fit, own in zip(fits, predicted, strict=True):
             fit.predicted = own
@@ -213,7 +213,7 @@ class Fitter:
         Parameters
         ----------
         starts
-            Hypotheses before their first step.
+            Hypotheses before their first step; one that has derivatives has predictions too.
         rounds
             Steps of each at most.
         derivatives
@@ -224,7 +224,8 @@ class Fitter:
         """
         fits, known = list(starts), tuple(known)
         with _running_away():
-            self._set(fits, self.predict([fit.theta for fit in fits]))
+            new = iter(self.predict([fit.theta for fit in fits if fit.slopes is None]))
+            self._set(fits, [next(new) if fit.slopes is None else fit.predicted for fit in fits])
         active, given_up = [fit for fit in fits if np.isfinite(fit.log_posterior)], set()
         for _ in range(rounds):
             if not active:
@@ -292,7 +293,7 @@ class Fitter:
             if is_anew and np.isfinite(fit.log_posterior)
         ]
         if usable:
-            self._set(usable, np.array([fit.predicted for fit in usable]))
+            self._set(usable, [fit.predicted for fit in usable])
 
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""

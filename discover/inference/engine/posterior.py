@@ -272,6 +272,7 @@ def _fitted_to(
         new = [fit for fit in wanted if frozenset(fit.names) not in done.found]
         if not new:
             return done
+        done = done.copied()
         done.add([done.fitter.start(fit.names, fit.theta) for fit in new])
     done.backwards().exchange()
     return done

@@ -1,11 +1,14 @@
 """Search among hypotheses: sets of effects, from the simplest on, with exchange and steps back."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.priors import Priors
 
 _BEAM = 3
 _REFITTED = 8
@@ -31,14 +34,26 @@ class Search:
     """Hypotheses that were fitted, by the set of their effects.
 
     `fitter`: what fits them. `most`: effects in one set. `say`: called with a line of text now and
-    then.
+    then. `known`: hypotheses that another search fitted, which are not fitted again.
     """
 
-    def __init__(self, fitter: Fitter, most: int = 3, say: Callable[[str], None] | None = None):
+    def __init__(
+        self,
+        fitter: Fitter,
+        most: int = 3,
+        say: Callable[[str], None] | None = None,
+        known: Mapping[Key, Fit] | None = None,
+    ):
         self.fitter, self.problem, self.most = fitter, fitter.problem, most
-        self.say = say or (lambda line: None)
+        self.say, self._known = say or (lambda line: None), known or {}
         self.found: dict[Key, Fit] = {}
         self._taken_out: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
+
+    def copied(self) -> "Search":
+        """Return a search that goes on from here, while this one stays as it is."""
+        other = copy(self)
+        other.found, other._taken_out = {**self.found}, {*self._taken_out}
+        return other
 
     def rank(self, fit: Fit) -> float:
         """Return the log of evidence times prior."""
@@ -58,7 +73,16 @@ class Search:
 
         `wanted`: so many of the best are asked for; what cannot come near them is given up.
         """
-        fits = self.fitter.fit(list(starts), wanted=wanted, known=self.found.values())
+        asked, before = [], {*self.found}
+        for start in starts:
+            key = frozenset(start.names)
+            fit = self._known.get(key)
+            # one that was given up is fitted where it is asked for once more
+            if fit is None or (fit.root is None and key in before):
+                asked.append(start)
+            else:
+                self.found.setdefault(key, fit)
+        fits = self.fitter.fit(asked, wanted=wanted, known=self.found.values())
         for fit in fits:
             key = frozenset(fit.names)
             known = self.found.get(key)
@@ -91,8 +115,8 @@ class Search:
             if not starts:
                 break
             best = max(map(self.rank, self.found.values()))
-            self.add(starts, wanted=_BEAM)
-            self.say(f"sets of {depth + 1}: {len(new)} fitted, likeliest: {self._likeliest}")
+            fitted = {fit.names for fit in self.add(starts, wanted=_BEAM)}
+            self.say(f"sets of {depth + 1}: {len(fitted)} fitted, likeliest: {self._likeliest}")
             level = sorted((self.found[key] for key in new), key=self.rank, reverse=True)[:_BEAM]
             level = [fit for fit in level if np.isfinite(self.rank(fit))]
             if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
@@ -100,7 +124,8 @@ class Search:
         self.backwards()
         self.exchange()
         self.backwards()
-        self.say(f"exchanged: {len(self.found)} sets, likeliest: {self._likeliest}")
+        own = len(self.found.keys() - self._known.keys())
+        self.say(f"exchanged: {own} sets, likeliest: {self._likeliest}")
         return self
 
     def scored(self, fit: Fit, every_start: bool = False) -> list[Fit]:
@@ -236,3 +261,22 @@ def refitted(fits: Sequence[Fit], fitter: Fitter) -> Search:
     search = Search(fitter)
     search.add([fitter.start(fit.names, fit.theta) for fit in fits])
     return search
+
+
+def without_by_mode(search: Search, fitter: Fitter) -> dict[Key, Fit]:
+    """Return what a search found that has no constant by mode, for another fitter of its rows.
+
+    The problems differ in which constants are by mode.
+    """
+    old, new = search.problem, fitter.problem
+    differ, first = {*old.declared.by_mode, *new.declared.by_mode}, old.declared.size
+    if differ - {effect.name for effect in old.candidates}:
+        return {}  # every hypothesis has one
+    shift, found = new.declared.size - first, {}
+    for key, fit in search.found.items():
+        if key.isdisjoint(differ):
+            theta, of_law = new.zero.copy(), 2 + len(old.declared.free_parameters)
+            theta[:of_law], theta[first + shift :] = fit.theta[:of_law], fit.theta[first:]
+            priors = {at if at < first else at + shift: own for at, own in fit.priors.items()}
+            found[key] = replace(fit, theta=theta, priors=Priors(priors), memory={**fit.memory})
+    return found

@@ -1,0 +1,86 @@
+"""Steps of the rate between two samples, whose instants are fitted, or were."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from discover.dataset import Run
+
+_NEVER = -1.0
+
+
+class RateSteps(eqx.Module):
+    """Steps of the rate between two samples, with a leading axis of runs.
+
+    `start`, `end`: times of the samples in s; padding lies before any record. `share`: of the
+    interval at whose end the rate steps, where not fitted. `place`: of its fitted share; −1 where
+    not fitted.
+    """
+
+    start: Float[Array | np.ndarray, "*runs steps"]
+    end: Float[Array | np.ndarray, "*runs steps"]
+    change: Float[Array | np.ndarray, "*runs steps"]  # of the rate in 1/s
+    share: Float[Array | np.ndarray, "*runs steps"]
+    place: Int[Array | np.ndarray, "*runs steps"]
+
+    def in_rate(
+        self, rate: Float[Array, " m"], times: Float[Array, " m"], fitted: Float[Array, " fitted"]
+    ) -> Float[Array, " m"]:
+        """Return the rate of one run with its steps where they happen.
+
+        Between the two samples Simpson's rule gives the strain of each step of the integration, so
+        that rates change smoothly with the instant. `rate`, `times`: at ends and middles of steps
+        in turn, in 1/s and s, with a straight line where the rate steps. `fitted`: the fitted
+        shares.
+        """
+        share = self.share
+        if fitted.shape[0]:
+            share = jnp.where(self.place < 0, share, fitted[self.place])
+        instant = self.start + share * (self.end - self.start)
+        ends = times[::2]
+        first, last = ends[:-1], ends[1:]
+        # of the two steps that meet at an end; beyond those of the record there is none
+        reach = jnp.concatenate([jnp.ones(1), ends[2:] - ends[:-2], jnp.ones(1)])
+
+        def added(start, end, change, instant):
+            at_ends = jnp.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
+            at_ends = jnp.where(ends <= start, 0.0, jnp.where(ends >= end, 1.0, at_ends))
+            strain = jnp.clip((last - instant) / (last - first), 0.0, 1.0)
+            in_middle = 1.5 * strain - 0.25 * (at_ends[:-1] + at_ends[1:])
+            stepped = jnp.zeros_like(times).at[::2].set(at_ends).at[1::2].set(in_middle)
+            straight = jnp.clip((times - start) / (end - start), 0.0, 1.0)
+            between = (times > start) & (times < end)
+            return change * jnp.where(between, stepped - straight, 0.0)
+
+        return rate + jnp.sum(jax.vmap(added)(self.start, self.end, self.change, instant), axis=0)
+
+    def padded(self, count: int) -> "RateSteps":
+        """Return as many steps of each run as asked for; those beyond its own never happen."""
+        beyond = ((0, 0), (0, count - self.start.shape[1]))
+        columns = (self.start, self.end, self.change, self.share, self.place)
+        fills = (_NEVER - 1.0, _NEVER, 0.0, 0.5, -1)
+        return RateSteps(
+            *(
+                np.pad(np.asarray(column), beyond, constant_values=fill)
+                for column, fill in zip(columns, fills, strict=True)
+            )
+        )
+
+
+def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
+    """Return the steps of runs whose instants are fitted or were; None where there is none."""
+    most = max(len(run.rate_steps) for run in runs)
+    if not most:
+        return None
+    rows = np.full((len(runs), most, 4), [_NEVER - 1.0, _NEVER, 0.0, 0.5])
+    place = np.full((len(runs), most), -1)
+    for i, run in enumerate(runs):
+        for k, step in enumerate(run.rate_steps):
+            rows[i, k] = step.start, step.end, step.change, step.share
+            place[i, k] = -1 if step.place is None else step.place
+    start, end, change, share = np.moveaxis(rows, -1, 0)
+    return RateSteps(start, end, change, share, place)
