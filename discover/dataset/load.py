@@ -92,6 +92,15 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     raise InputError(why)
 
 
+def files_of(root: Path) -> list[Path]:
+    """Return the files of a folder that `load_dataset` reads samples from, and ``runs.csv``.
+
+    Raises InputError if ``runs.csv`` is wrong.
+    """
+    names = [*DATA_FILES, *read_index(root).columns["file"]]
+    return [root / name for name in dict.fromkeys(names) if os.path.lexists(root / name)]
+
+
 def load_dataset(
     folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None,
     rate_is_measured: bool = False,
