@@ -13,7 +13,7 @@ from scipy.stats import t as student
 from discover.answer import QUANTITIES, TOLERANCE, Answer, HasAnswer, Mode
 from discover.answer import Constant as Fitted
 from discover.dataset import Dataset
-from discover.equations import Equation, HasEquation
+from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS, Fluid
@@ -211,9 +211,11 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
 
     def to_json(self) -> dict[str, Any]:
         """Return the fit as ``fit.json`` holds it."""
+        equation = self.answer.equation
         return {
             "law": self.law,
             **self.answer.to_json(),
+            "answer_law": None if equation is None else equation_to_json(equation),
             "adequate_to_the_noise": self.fits_to_the_noise,
             "error": {"fit": self.error, "held_out": self.held_out_error},
             "noise": self.misfit.noise,

@@ -1,6 +1,7 @@
 """Fits of one named law, to start-ups by scipy and closed forms."""
 
 import json
+import runpy
 
 import numpy as np
 import pandas as pd
@@ -154,6 +155,14 @@ def test_the_command_writes_page_json_and_equation(data, tmp_path):
     assert "Fits within the noise of" in (out / "report.html").read_text()
     assert (out / "equations.tex").exists()
     assert (out / "figures" / "runs.svg").exists()
+    exported = CliRunner().invoke(app, ["export", str(out), "--out", str(tmp_path / "law.py")])
+    assert exported.exit_code == 0, exported.output
+    law = runpy.run_path(str(tmp_path / "law.py"))
+    times = np.geomspace(0.1, 6.0, 9)
+    stress = law["simulate_shear"](lambda t: 6.0, times)[0]
+    wanted = giesekus_start_up(6.0, times)
+    # 1 % of noise leaves the constants open by some per cent (above)
+    assert np.max(np.abs(stress - wanted)) < 0.03 * np.max(wanted)
 
 
 def test_a_fit_has_the_answer_of_the_other_commands(fitted):
