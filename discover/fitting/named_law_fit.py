@@ -86,6 +86,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         Name of the data.
     tolerance
         Relative discrepancy that is good enough.
+    temperature_C
+        Temperature of the fitted runs; None where they have several or none, or are shifted.
     """
 
     law: str
@@ -101,6 +103,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     written: Equation | None = None
     title: str = ""
     tolerance: float = TOLERANCE
+    temperature_C: float | None = None
 
     _page: ClassVar[str] = "discover.report.in_memory:fit_page"
 
@@ -194,6 +197,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
             {name: one for name, one in expected.items() if one is not None},
             failed=self._caveats(),
             tolerance=self.tolerance,
+            temperature_C=self.temperature_C,
         )
         if equation is None:
             return answer

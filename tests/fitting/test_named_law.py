@@ -20,7 +20,7 @@ def giesekus_start_up(rate, times):
     return Giesekus(MOBILITY, MODULUS, TIME).respond(start_up(rate), times).sigma12
 
 
-def data_of(stress_of, rates, seed=0, sweep=None):
+def data_of(stress_of, rates, seed=0, sweep=None, runs=None):
     generator = np.random.default_rng(seed)
     times = np.linspace(0.05, 8.0, 80)
     frames = []
@@ -38,7 +38,7 @@ def data_of(stress_of, rates, seed=0, sweep=None):
             )
         )
     tables = None if sweep is None else {"lve": sweep}
-    return dc.from_dataframe(pd.concat(frames), tables=tables)
+    return dc.from_dataframe(pd.concat(frames), runs, tables)
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +120,7 @@ def test_a_fixed_constant_stays_and_is_not_fitted(data):
     assert list(found.summary().index) == ["modulus_Pa", "relaxation_time_s"]
 
 
+@pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize(
     ("law", "options", "said"),
     [
@@ -176,6 +177,14 @@ def test_a_fit_has_the_answer_of_the_other_commands(fitted):
     assert fitted.adequate
     assert fitted.answer.headline.startswith("Giesekus, α = 0.3")
     assert any("Fits within the noise of" in note for note in fitted.answer.equation.notes)
+
+
+@pytest.mark.parametrize(("measured_at", "said"), [((25.0, 25.2), 25.0), ((25.0, 40.0), None)])
+def test_constants_are_those_of_the_temperature_of_the_runs(measured_at, said):
+    runs = pd.DataFrame({"file": ["0.5", "2"], "temperature_C": measured_at})
+    found = dc.fit("giesekus", data_of(giesekus_start_up, (0.5, 2.0), runs=runs))
+    assert found.use["temperature_C"] == said
+    assert ("at 25 °C" in found.text) is (said is not None)
 
 
 def test_a_solvent_that_is_fitted_is_the_whole_one():
