@@ -231,10 +231,9 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     @cached_property
     def text(self) -> str:
         """The fit in a few sentences."""
-        said = [self.answer.headline, self.answer.failed]
-        if self.held_out_error is not None:
-            said.insert(1, f"Held-out runs: {percent_of(self.held_out_error)}.")
-        return " ".join(filter(None, said))
+        if self.held_out_error is None:
+            return self.answer.headline
+        return f"{self.answer.headline} Held-out runs: {percent_of(self.held_out_error)}."
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.text}>"
