@@ -321,3 +321,25 @@ def test_an_estimator_is_saved_in_a_file_of_a_folder_that_is_there(tmp_path):
     with pytest.raises(dc.InputError, match=r"There is no folder .*absent"):
         fitted.save(tmp_path / "absent" / "law.discover")
     assert not list(tmp_path.iterdir())
+
+
+FLUID = dc.Fluid(UCM, [100.0], [1.0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((UCM, dc.start_up(1.0), TIMES), r"takes a Fluid.*Fluid\(law"),
+        ((FLUID, 1.0, TIMES), r"takes a flow, such as start_up\(0\.5\)"),
+        # backwards, the last time is that of rest: the stress was zero throughout
+        ((FLUID, dc.start_up(1.0), TIMES[::-1]), "increase strictly"),
+        ((FLUID, dc.start_up(1.0), [0.0, 1.0, 1.0]), "increase strictly"),
+        ((FLUID, dc.start_up(1.0), TIMES - 1.0), "at or after 0"),
+        ((FLUID, dc.start_up(1.0), []), "at or after 0"),
+        ((FLUID, dc.start_up(1.0), 2.0), "times of simulate must be a list"),
+        ((FLUID, dc.start_up(1.0), [0.0, np.nan]), "sample 1 holds nan"),
+    ],
+)
+def test_simulate_refuses_what_is_no_fluid_flow_or_time(arguments, said):
+    with pytest.raises(dc.InputError, match=said):
+        dc.simulate(*arguments)
