@@ -84,6 +84,8 @@ class EstimatorFile:
 
     def __init__(self, path: str | Path):
         self._path = Path(path)
+        if os.path.isdir(self._path):
+            raise InputError(f"{path} is a folder. Give the file that estimator.save(path) wrote.")
         # a pipe or a device has no end, and is refused here
         packed = read_bytes(self._path, str(self._path), "Check the path.", largest=_LARGEST)
         content: Any = None

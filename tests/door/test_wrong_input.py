@@ -318,6 +318,8 @@ def test_an_estimator_is_saved_in_a_file_of_a_folder_that_is_there(tmp_path):
     for path in (tmp_path, ".", ""):
         with pytest.raises(dc.InputError, match=r"is a folder\. Name a file"):
             fitted.save(path)
+    with pytest.raises(dc.InputError, match=r"is a folder\. Give the file that estimator\.save"):
+        dc.load(tmp_path)
     with pytest.raises(dc.InputError, match=r"There is no folder .*absent"):
         fitted.save(tmp_path / "absent" / "law.discover")
     assert not list(tmp_path.iterdir())
