@@ -126,7 +126,8 @@ class SummaryView(NotebookView):
         index = self._index_of(estimates)
         values = [(one.value, one.standard_error) for one in estimates]
         numbers = pd.DataFrame(values, index=index, columns=["value", "standard_error"])
-        notes = pd.DataFrame([{"unit": one.unit, **one.notes} for one in estimates], index=index)
+        notes = [{"unit": one.unit, **one.notes} for one in estimates]
+        notes = pd.DataFrame(notes, index, None if notes else ["unit"])
         return pd.concat([numbers.astype(float), self.conf_int(), notes], axis=1)
 
     def conf_int(self, level: float = 0.95) -> pd.DataFrame:

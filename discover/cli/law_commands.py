@@ -93,7 +93,7 @@ def _bounds(name: str, text: str) -> tuple[float, float]:
 def export(
     results: Annotated[
         Path,
-        Argument(help="Result folder of compare, close-loop or fit.", show_default=False),
+        Argument(help="Result folder of a compare, close-loop or fit.", show_default=False),
     ],
     form: Annotated[
         str, Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")

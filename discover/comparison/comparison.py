@@ -10,6 +10,7 @@ from discover.answer import Answer, HasAnswer
 from discover.comparison.bands import Band
 from discover.comparison.classical import ClassicalFit
 from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
+from discover.comparison.hypotheses import terms_named
 from discover.comparison.outcome import LearnerOutcome, Placement, place
 from discover.comparison.rivals import Rival
 from discover.comparison.statements import IN_LIBRARY, Statement, outcome_equation
@@ -79,10 +80,13 @@ class Comparison(PageView, HasAnswer, SummaryView):
 
     def _estimates(self) -> list[Estimate]:
         found = []
-        rivals = [set(rival.law.coefficients) for rival in self.rivals]
+        laws = [set(rival.law.coefficients) for rival in self.rivals]
+        for one in self.posterior.explanations.likeliest_first:
+            if one.probability > _POSSIBLE:
+                laws += map(terms_named, one.members)
         for name, outcome in self.outcomes.items():
             left = self.lack_of_fit.get(name)
-            found += estimates_of(outcome.terms, left, rivals, (name,))
+            found += estimates_of(outcome.terms, left, laws, (name,), self._against(name))
         for one in self.answer.estimates:
             found.append(replace(one, key=("answer", *one.key)))
         return found
@@ -104,7 +108,18 @@ class Comparison(PageView, HasAnswer, SummaryView):
     @property
     def determined_terms(self) -> bool:
         """Whether the sparse law is one that the posterior holds possible."""
-        return self.verdict == "explained" and self.shares.get("tensor_sindy", 0.0) > _POSSIBLE
+        return not self._against("tensor_sindy")
+
+    def _against(self, learner: str) -> str:
+        """Return why the posterior does not hold the law of a learner possible; empty if it does.
+
+        Of a network that is the law its terms make: the network itself may fit, and they not.
+        """
+        if self.verdict != "explained":
+            return "no law describes the runs to the noise"
+        if self.shares.get(learner, 0.0) <= _POSSIBLE:
+            return "the law of these terms is not among the likely ones"
+        return ""
 
     @property
     def disagreement(self) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Posterior of a comparison: a search's hypotheses and the learners' proposals, weighed."""
 
 import queue
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from threading import Event
@@ -185,6 +185,13 @@ def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
     terms = combined(tuple(terms))
     # a sum has one inner constant of a name
     return terms if len({term.term for term in terms}) == len(terms) else None
+
+
+def terms_named(effects: Iterable[str]) -> set[str]:
+    """Return the names of the terms that effects are; an effect that is no term has its own."""
+    terms = {effect: term for term, (effect, _) in _EFFECTS.items()}
+    terms["ptt_exponential"] = _EXPONENTIAL
+    return {terms.get(effect, effect) for effect in effects}
 
 
 R = TypeVar("R")

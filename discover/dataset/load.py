@@ -92,6 +92,15 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     raise InputError(why)
 
 
+def files_of(root: Path) -> list[Path]:
+    """Return the files of a folder that `load_dataset` reads samples from, and ``runs.csv``.
+
+    Raises InputError if ``runs.csv`` is wrong.
+    """
+    names = [*DATA_FILES, *read_index(root).columns["file"]]
+    return [root / name for name in dict.fromkeys(names) if os.path.lexists(root / name)]
+
+
 def load_dataset(
     folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None,
     rate_is_measured: bool = False,
@@ -239,6 +248,9 @@ def from_dataframe(
     for label, table in [("samples", samples), ("runs", runs), *(tables or {}).items()]:
         if not (table is None or isinstance(table, pd.DataFrame)):
             raise InputError(f"{label} must be a pandas DataFrame; got a {type(table).__name__}.")
+    samples, runs = (one if one is None else _flat(one) for one in (samples, runs))
+    tables = {kind: _flat(table) for kind, table in (tables or {}).items()}
+    for label, table in [("samples", samples), ("runs", runs), *tables.items()]:
         odd = [] if table is None else [one for one in table.columns if not isinstance(one, str)]
         if odd:
             raise InputError(
@@ -248,7 +260,7 @@ def from_dataframe(
     known = [*signature(_read_folder).parameters][2:]
     if no_option := [one for one in options if one not in known]:
         raise InputError(unknown_name("option", no_option[0], known, "from_dataframe"))
-    if unknown := [kind for kind in tables or {} if kind not in _KINDS]:
+    if unknown := [kind for kind in tables if kind not in _KINDS]:
         raise InputError(unknown_name("table", unknown[0], _KINDS))
     by_run = _by_run(samples, name)
     with TemporaryDirectory() as folder:
@@ -257,11 +269,17 @@ def from_dataframe(
         index = pd.DataFrame({"file": list(by_run)}) if runs is None else _index(runs, by_run)
         if len(index):
             index.to_csv(Path(folder) / INDEX_FILE, index=False)
-        for kind, table in (tables or {}).items():
+        for kind, table in tables.items():
             table.to_csv(Path(folder) / f"{kind}.csv", index=False)
         if not any(Path(folder).iterdir()):
             raise InputError("There is no sample and no table; give one with samples at least.")
         return _read_folder(Path(folder), name, **options)
+
+
+def _flat(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with the named levels of its index as columns."""
+    named = [n for n in table.index.names if isinstance(n, str) and n not in table.columns]
+    return (table.reset_index(level=named) if named else table).reset_index(drop=True)
 
 
 def _can_name_a_run(name: object) -> bool:

@@ -143,6 +143,11 @@ class Run(NotebookView):
                 f"time {its} must start at or after 0 and increase strictly. Sort the samples and "
                 "remove repeated times."
             )
+        if self.protocol.control == "rate" and not self.time[-1] > 0:
+            raise InputError(
+                f"The run {self.name!r} has one sample, at time 0, before anything has flowed. "
+                "Give later ones, or leave the run out."
+            )
         if not 0 < self.clock_factor < math.inf:
             raise InputError(f"The clock factor {its} must be positive; got {self.clock_factor}.")
         if not np.isfinite(self.rate_before):

@@ -24,7 +24,8 @@ from tensor_library.law_terms import LawTerm
 
 COMPARISON, LOOP, FIT, BATCH = "comparison.json", "loop.json", "fit.json", "batch.json"
 AUGMENTED, NEAREST, ANSWER = "augmented", "nearest_law", "answer"
-"""Names of the law of a closed loop, of a classical one in its place, of a comparison's answer."""
+"""Names of the law of a closed loop, of a classical one in its place, and of the law of the answer
+of a comparison or a fit."""
 
 
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
@@ -52,8 +53,8 @@ def read_result(folder: str | Path) -> tuple[Any, str]:
             f"{path} holds a batch. Give the folder of one study in it, such as {path / 'STUDY'}."
         )
     raise InputError(
-        f"{path} holds no {COMPARISON}, {LOOP} or {FIT}. Give a folder that discover compare, "
-        "close-loop or fit has finished."
+        f"{path} holds none of {COMPARISON}, {LOOP} and {FIT}. Give a folder that discover "
+        "compare, close-loop or fit has finished."
     )
 
 
@@ -70,10 +71,12 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
     old = f"{where} holds no law: it was written before laws were kept. Run again with --overwrite."
     if not isinstance(content, dict):
         raise InputError(f"{where} is not a result of discover. Run again with --overwrite.")
-    if content.get("equation") is not None:
-        return {ANSWER: equation_from_json(content["equation"], f"{where}: equation")}
-    if "equation" in content:
-        raise InputError(f"{where}: this law cannot be written out as an equation.")
+    answer = content.get("answer_law")
+    laws = {} if answer is None else {ANSWER: equation_from_json(answer, f"{where}: answer_law")}
+    if isinstance(content.get("law"), str):  # the name of the law that was fitted
+        if not laws:
+            raise InputError(f"{where}: {content['law'][:80]} has no written form.")
+        return laws
     if "law" in content or "law_missing" in content:
         near = content.get("nearest_law")
         if content.get("law") is None and isinstance(near, dict) and near.get("equation"):
@@ -84,16 +87,14 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
     learners = content.get("learners")
     if not isinstance(learners, dict):
         raise InputError(old)
-    laws = {
+    learned = {
         str(name): equation_from_json(learner["law"], f"{where}: learners.{name}.law")
         for name, learner in learners.items()
         if isinstance(learner, dict) and learner.get("law") is not None
     }
-    if not laws:
+    if not learned:
         raise InputError(old)
-    if content.get("answer_law") is not None:
-        laws[ANSWER] = equation_from_json(content["answer_law"], f"{where}: answer_law")
-    return laws
+    return learned | laws
 
 
 def read_json(path: Path) -> Any:

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from discover.answer import TOLERANCE
 from discover.dataset import Dataset, Run
+from discover.dataset.run_table import temperature_of
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
 from discover.forward import AugmentedModel
@@ -142,6 +143,7 @@ def fit(
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
         _what_is_left(records, fitted, Expectation(noise, forward.linear_error)), tuple(records),
         model, best.theta, declared_law(forward, best.theta, {}), data.name, tolerance,
+        temperature_of(fitted),
     )  # fmt: skip
 
 

@@ -86,6 +86,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         Name of the data.
     tolerance
         Relative discrepancy that is good enough.
+    temperature_C
+        Temperature of the fitted runs; None where they have several or none, or are shifted.
     """
 
     law: str
@@ -101,6 +103,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     written: Equation | None = None
     title: str = ""
     tolerance: float = TOLERANCE
+    temperature_C: float | None = None
 
     _page: ClassVar[str] = "discover.report.in_memory:fit_page"
 
@@ -194,6 +197,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
             {name: one for name, one in expected.items() if one is not None},
             failed=self._caveats(),
             tolerance=self.tolerance,
+            temperature_C=self.temperature_C,
         )
         if equation is None:
             return answer
@@ -211,11 +215,11 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
 
     def to_json(self) -> dict[str, Any]:
         """Return the fit as ``fit.json`` holds it."""
-        written = self.answer.equation
+        equation = self.answer.equation
         return {
             "law": self.law,
-            "equation": None if written is None else equation_to_json(written),
             **self.answer.to_json(),
+            "answer_law": None if equation is None else equation_to_json(equation),
             "adequate_to_the_noise": self.fits_to_the_noise,
             "error": {"fit": self.error, "held_out": self.held_out_error},
             "noise": self.misfit.noise,
@@ -227,10 +231,9 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     @cached_property
     def text(self) -> str:
         """The fit in a few sentences."""
-        said = [self.answer.headline, self.answer.failed]
-        if self.held_out_error is not None:
-            said.insert(1, f"Held-out runs: {percent_of(self.held_out_error)}.")
-        return " ".join(filter(None, said))
+        if self.held_out_error is None:
+            return self.answer.headline
+        return f"{self.answer.headline} Held-out runs: {percent_of(self.held_out_error)}."
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.text}>"

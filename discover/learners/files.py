@@ -54,8 +54,13 @@ def write_estimator(
 ) -> Path:
     """Write an estimator to a file, replacing it whole or not at all.
 
-    Raises InputError if something of it cannot be written.
+    Raises InputError if something of it cannot be written, or `path` cannot be that of a file.
     """
+    path = Path(path)
+    if os.path.isdir(path) or not path.name:
+        raise InputError(f"{path} is a folder. Name a file, such as {path / 'law.discover'}.")
+    if not os.path.isdir(path.parent):
+        raise InputError(f"There is no folder {path.parent} to save {path.name} in. Make it first.")
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -64,7 +69,6 @@ def write_estimator(
         "parameters": {k: plain(v, types, f"The parameter {k!r}") for k, v in parameters.items()},
         "fitted": {k: plain(v, types, f"The attribute {k!r}") for k, v in fitted.items()},
     }
-    path = Path(path)
     partial = path.with_name(path.name + ".partial")
     partial.write_bytes(gzip.compress(json.dumps(content, ensure_ascii=False).encode()))
     os.replace(partial, path)
@@ -80,6 +84,8 @@ class EstimatorFile:
 
     def __init__(self, path: str | Path):
         self._path = Path(path)
+        if os.path.isdir(self._path):
+            raise InputError(f"{path} is a folder. Give the file that estimator.save(path) wrote.")
         # a pipe or a device has no end, and is refused here
         packed = read_bytes(self._path, str(self._path), "Check the path.", largest=_LARGEST)
         content: Any = None

@@ -117,16 +117,17 @@ def estimates_of(
     left: LackOfFit | None,
     rivals: Iterable[Collection[str]],
     key: tuple[str, ...] = (),
+    against: str = "",
 ) -> list[Estimate]:
     """Return the coefficients of terms, and whether the data determine each.
 
     `left`: lack of fit of the law; None if unknown. `rivals`: terms of laws that the runs do not
-    exclude. `key`: index levels before the term.
+    exclude. `key`: index levels before the term. `against`: what else speaks against the law.
     """
     rivals = list(rivals)
     found = []
     for term in terms:
-        notes = {"determined": _determined(term, left, rivals)}
+        notes = {"determined": _determined(term, left, rivals, against)}
         found.append(Estimate((*key, term.term), term.coefficient, term.ci95, notes=notes))
         for name, value in term.inner.items():
             ends = term.inner_ci95.get(name)
@@ -135,12 +136,14 @@ def estimates_of(
 
 
 def _determined(
-    term: RecoveredTerm, left: LackOfFit | None, rivals: Iterable[Collection[str]]
+    term: RecoveredTerm, left: LackOfFit | None, rivals: Iterable[Collection[str]], against: str
 ) -> str:
     if term.ci95 is None:
         return "no: without interval"
     if left is not None and left.verdict != "explained":
         return "no: the law misses the runs by more than noise"
+    if against:
+        return f"no: {against}"
     if not term.is_told_from_zero:
         return "no: may be zero"
     if any(term.term not in rival for rival in rivals):

@@ -18,6 +18,8 @@ from discover.protocols import settled
 from discover.protocols.kinematics import STATES
 from discover.words import percent_of
 
+_MAKE = "Load a folder with load_dataset, or make a data set of a table with from_dataframe."
+
 
 def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool = True) -> list[Run]:
     """Return the runs as a list, each as `as_compared` has it.
@@ -35,8 +37,7 @@ def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool =
         )
     if isinstance(runs, str) or not isinstance(runs, Iterable):
         raise InputError(
-            f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__}. "
-            "Load a folder with load_dataset."
+            f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__}. {_MAKE}"
         )
     listed = list(runs)
     if not listed:
@@ -44,8 +45,8 @@ def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool =
     for run in listed:
         if not isinstance(run, Run):
             raise InputError(
-                f"A learner takes a sequence of Run; got a {type(run).__name__}. Load a "
-                "folder or make a synthetic data set."
+                f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__} "
+                f"that holds a {type(run).__name__}. {_MAKE}"
             )
     longest = float(np.max(np.asarray(relaxation_time)))
     return [waiting(run, longest, relaxes) for run in as_compared(listed)]

@@ -81,9 +81,27 @@ class Path:
         # where none of them is all there is, the one that predicts best
         names = best[0][0].names if best and self.verdict == "unexplained" else told[0].members[0]
         found = self.fitted(names)
-        while found.at_an_end:  # what the runs held out asked for may be nothing in the fitted
-            found = self.fitted(set(found.names) - set(found.at_an_end))
+        while idle := self._idle(found):
+            found = self.fitted(set(found.names) - set(idle))
         return found
+
+    def _idle(self, fit: Fit) -> tuple[str, ...]:
+        """Return effects of a hypothesis for which the fitted runs do not ask.
+
+        They may have been asked for by the runs held out, or by those left out in turn, to which
+        hypotheses are alike that differ by an effect of no size.
+        """
+        if fit.at_an_end or self.verdict != "unexplained":
+            return fit.at_an_end
+        gained = {}
+        for name in fit.names:
+            without = self.fitted(set(fit.names) - {name})
+            # each constant fits noise by one   [Akaike 1974, IEEE Trans. Autom. Control 19, 716]
+            constants = len(self.posterior.problem.effects[name].parameters)
+            gained[name] = fit.log_likelihood - without.log_likelihood - constants
+        # one at a time: of two that do the same either is idle beside the other
+        least = min(gained, key=gained.__getitem__, default="")
+        return (least,) if least and gained[least] < 0.0 else ()
 
     @cached_property
     def path(self) -> list[Fit]:

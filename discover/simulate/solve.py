@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.run import Run
+from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.forward.flows import make_batch
 from discover.forward.grid import MAX_GRID_POINTS, STRAIN_STEP, had_gone_on
@@ -84,11 +85,11 @@ def simulate(
     Raises
     ------
     InputError
-        If the flow is not at a given rate.
+        If the flow is not at a given rate, or an argument is none of these.
     SimulationError
         If no solution to this tolerance was found within 400,000 steps.
     """
-    times = np.asarray(times, dtype=float)
+    times = _sampling(fluid, protocol, times)
     if protocol.control in ("stress", "oscillation"):
         raise InputError(
             "simulate takes flows at a given rate, in time or steady; got one of control "
@@ -119,6 +120,26 @@ def simulate(
             f"needs more than {MAX_STEPS} steps. Check its parameters and the shear rate."
         )
     return ShearStress(times, found[:, :4] + viscous)
+
+
+def _sampling(fluid: Any, protocol: Any, times: Any) -> Float[np.ndarray, " n"]:
+    """Return the sampling times as an array; raises InputError if an argument is none."""
+    if not isinstance(fluid, Fluid):
+        raise InputError(
+            f"simulate takes a Fluid; got a {type(fluid).__name__}. Make one of a law with "
+            "Fluid(law, modulus, relaxation_time)."
+        )
+    if not isinstance(protocol, FlowProtocol):
+        raise InputError(
+            f"simulate takes a flow, such as start_up(0.5); got a {type(protocol).__name__}."
+        )
+    times = as_column(times, "times of simulate")
+    if not len(times) or times[0] < 0.0 or not np.all(np.diff(times) > 0.0):
+        raise InputError(
+            "times of simulate must start at or after 0 and increase strictly. Sort them and "
+            "remove repeated ones."
+        )
+    return times
 
 
 def _halved(fluid: Fluid, run: Run, rtol: float, atol: float) -> Float[np.ndarray, "n s"]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from discover._version import __version__
 from discover.dataset import Dataset
-from discover.dataset.load import load_dataset, resolve_folder
+from discover.dataset.load import files_of, load_dataset, resolve_folder
 from discover.dataset.material_functions import TABLES
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
@@ -175,7 +175,8 @@ def fingerprint(study: Study, *extra: object) -> str:
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())
     if study.data.folder is not None:
-        for path in sorted(resolve_folder(study.data.folder, _base(study)).glob("*.csv")):
+        # what else lies there decides nothing, and may be a result of this very study
+        for path in files_of(resolve_folder(study.data.folder, _base(study))):
             digest.update(path.name.encode("utf-8", "surrogateescape"))
             digest.update(read_bytes(path, path.name))
     if study.model.from_ is not None:

@@ -89,8 +89,13 @@ def test_a_wrong_request_is_one_line_and_exit_code_2(results, arguments, word):
         ("comparison.json", "{}", "--overwrite"),
         ("comparison.json", '{"learners": {"tensor_sindy": {"law": {}}}}', "format"),
         ("loop.json", '{"law": null, "law_missing": "thixotropy has a state"}', "thixotropy"),
+        (
+            "fit.json",
+            '{"law": "a law of mine", "answer_law": null}',
+            "a law of mine has no written",
+        ),
         ("batch.json", "{}", "one study"),
-        ("nothing.txt", "", "no comparison.json, loop.json or fit.json"),
+        ("nothing.txt", "", "none of comparison.json, loop.json and fit.json"),
     ],
 )
 def test_results_that_hold_no_law_say_so(tmp_path, name, text, word):

@@ -104,6 +104,7 @@ def test_a_result_without_constants_has_an_empty_table():
             return []
 
     assert Result().summary().empty
+    assert list(Result().summary().columns) == COLUMNS
     assert list(Result().conf_int().columns) == ["low", "high"]
 
 

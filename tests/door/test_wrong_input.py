@@ -56,6 +56,7 @@ class WithUnit:
         (lambda: run(rate=0.5), "rate of the run 'a' must be a list or an array of numbers"),
         (lambda: run(time=TIMES[:, None]), "an array of shape"),
         (lambda: run(time=[], rate=[], stress=[]), "has no samples"),
+        (lambda: run(time=[0.0], rate=[0.5], stress=[0.0]), "one sample, at time 0"),
         (lambda: run(time=TIMES[::-1]), "increase strictly"),
         (lambda: run(time=TIMES - 1.0), "at or after 0"),
         (lambda: run(rate=RATES[:2]), r"must have shape \(31,\) like its time; got \(2,\)"),
@@ -282,3 +283,65 @@ def test_one_sample_and_one_run_are_counted_in_the_singular():
 def test_a_table_that_is_none_of_samples_is_refused(table):
     with pytest.raises(dc.InputError):
         dc.from_dataframe(table)
+
+
+SAMPLES = pd.DataFrame(
+    {"run": "a", "time_s": TIMES, "shear_rate_1_s": RATES, "stress_Pa": STRESS}
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_a_table_in_place_of_a_data_set_is_refused_with_what_makes_one_of_it(learner):
+    for table in (SAMPLES, SAMPLES[["time_s", "stress_Pa"]].to_numpy()):
+        with pytest.raises(dc.InputError, match=f"{type(table).__name__} .*from_dataframe"):
+            learner().fit(table)
+
+
+def test_levels_of_an_index_that_have_names_are_columns():
+    plain = dc.from_dataframe(SAMPLES)
+    for levels in (["run"], ["run", "time_s"]):
+        found = dc.from_dataframe(SAMPLES.set_index(levels))
+        assert found.names == plain.names
+        np.testing.assert_array_equal(found[0].time, plain[0].time)
+    # an index that repeats a column says nothing more
+    assert dc.from_dataframe(SAMPLES.set_index("run", drop=False)).names == plain.names
+
+
+def test_an_estimator_is_saved_in_a_file_of_a_folder_that_is_there(tmp_path):
+    omega = np.geomspace(0.01, 100.0, 15)
+    sweep = pd.DataFrame(
+        {"omega_rad_s": omega, "Gp_Pa": 50 * omega**2 / (1 + omega**2),
+         "Gpp_Pa": 50 * omega / (1 + omega**2)}
+    )  # fmt: skip
+    data = dc.from_dataframe(SAMPLES, tables={"lve": sweep.set_index("omega_rad_s")})
+    fitted = dc.TensorSINDy(base=dc.Fluid.from_sweep(data.linear_sweep)).fit(data)
+    for path in (tmp_path, ".", ""):
+        with pytest.raises(dc.InputError, match=r"is a folder\. Name a file"):
+            fitted.save(path)
+    with pytest.raises(dc.InputError, match=r"is a folder\. Give the file that estimator\.save"):
+        dc.load(tmp_path)
+    with pytest.raises(dc.InputError, match=r"There is no folder .*absent"):
+        fitted.save(tmp_path / "absent" / "law.discover")
+    assert not list(tmp_path.iterdir())
+
+
+FLUID = dc.Fluid(UCM, [100.0], [1.0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((UCM, dc.start_up(1.0), TIMES), r"takes a Fluid.*Fluid\(law"),
+        ((FLUID, 1.0, TIMES), r"takes a flow, such as start_up\(0\.5\)"),
+        # backwards, the last time is that of rest: the stress was zero throughout
+        ((FLUID, dc.start_up(1.0), TIMES[::-1]), "increase strictly"),
+        ((FLUID, dc.start_up(1.0), [0.0, 1.0, 1.0]), "increase strictly"),
+        ((FLUID, dc.start_up(1.0), TIMES - 1.0), "at or after 0"),
+        ((FLUID, dc.start_up(1.0), []), "at or after 0"),
+        ((FLUID, dc.start_up(1.0), 2.0), "times of simulate must be a list"),
+        ((FLUID, dc.start_up(1.0), [0.0, np.nan]), "sample 1 holds nan"),
+    ],
+)
+def test_simulate_refuses_what_is_no_fluid_flow_or_time(arguments, said):
+    with pytest.raises(dc.InputError, match=said):
+        dc.simulate(*arguments)

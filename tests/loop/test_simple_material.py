@@ -155,6 +155,20 @@ def test_a_comparison_says_the_same_and_asks_no_learner(tmp_path):
     assert "Laws found" not in page
 
 
+@pytest.mark.parametrize(
+    ("free", "law"), [(["modulus_Pa", "relaxation_time_s"], "newtonian"), (["modulus_Pa"], None)]
+)
+def test_a_constant_viscosity_is_no_elastic_fluid_unless_its_time_is_declared(free, law):
+    # the declared mode starts where a study starts it: it has the viscosity of the curve
+    declared = DeclaredModel.named("ucm", {}, [6.0], [0.5], free=free)
+    data = Dataset("oil", (flow_curve(lambda r: 3.0 * r),))
+    found = run_loop(data, declared)
+    assert (found.material.law if found.material else None) == law
+    if law:
+        assert found.use["constants"]["viscosity_Pa_s"]["value"] == pytest.approx(3.0, rel=0.02)
+        assert "lambda" not in found.answer.written["rheotool"]
+
+
 def oscillations(stress, noise):
     """Return two oscillations, of which the stress is a function of time, rate and amplitude."""
     times, runs = np.linspace(0.0, 12.0, 60), []

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_comparison import NOT_THERE, TIMES, flow, made_up, outcome, page_of
+from made_up_comparison import NOT_THERE, TIMES, flow, made_up, outcome, page_of, posterior
 
 from discover.learners import RecoveredTerm
+from discover.loop import ErrorPair
+from discover.loop.parts import Explanation, Explanations
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows, learner_lines
 from discover.report.page import Missing, attempt
@@ -38,6 +40,38 @@ def test_no_wording_fails_over_a_number_that_is_missing(number):
     assert interval((number, 1.0)) in ("–", "inf to 1")
     assert significant(number) in ("–", "inf")
     assert estimate(0.2, (number, 1.0)) == "0.2"
+
+
+def told_of_terms(verdict, network_share, *sets):
+    """Return what a summary says of σ·σ of either learner, for a posterior over sets of effects."""
+    pair = ErrorPair(0.01, 0.01)
+    share = 1.0 / max(len(sets), 1)
+    likely = tuple(Explanation(effects, share, pair, {}) for effects in sets)
+    result = replace(posterior(verdict, 0.01), explanations=Explanations(likely, 0.0))
+    bare = {name: outcome(name, 0.2, True) for name in ("tensor_sindy", "tbnn_ude")}
+    shares = {"tensor_sindy": 0.9, "tbnn_ude": network_share}
+    found = made_up(outcomes=bare, posterior=result, shares=shares, rivals=[])
+    return found.summary()["determined"].drop("answer", errors="ignore").droplevel(1)
+
+
+GIESEKUS, SLIP = ("giesekus_mobility",), ("giesekus_mobility", "wall_slip")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sparse", "network"),
+    [
+        (("explained", 0.9, GIESEKUS, SLIP), "yes", "yes"),
+        # a network fits by a function of its own, whatever its projection does
+        (("explained", 0.0, GIESEKUS, SLIP), "yes", "no: the law of these terms is not among"),
+        (("explained", 0.9, GIESEKUS, ("ptt_linear",)), "no: a law without", "no: a law without"),
+        # each learner may describe the runs as far as it can see where the posterior does not
+        (("unexplained", 0.9, GIESEKUS), "no: no law describes", "no: no law describes"),
+    ],
+)
+def test_a_term_is_determined_only_if_every_likely_law_has_it(arguments, sparse, network):
+    told = told_of_terms(*arguments)
+    assert told["tensor_sindy"].startswith(sparse)
+    assert told["tbnn_ude"].startswith(network)
 
 
 def test_a_part_that_cannot_be_drawn_is_one_sentence_and_the_others_are_drawn(

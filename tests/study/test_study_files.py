@@ -164,6 +164,26 @@ def test_the_fingerprint_changes_with_study_seed_and_data(tmp_path):
     assert first != fingerprint(read_study(file), 1)
 
 
+def test_the_fingerprint_is_of_the_files_that_are_read_whatever_their_names_end_in(tmp_path):
+    folder = tmp_path / "bench 3"
+    folder.mkdir()
+    (folder / "runs.csv").write_text("file\nmonday.dat\nTUESDAY.CSV\n")
+    for name in ("monday.dat", "TUESDAY.CSV", "lve.csv"):
+        (folder / name).write_text("a,b\n1,2\n")
+    study = parse_study({"data": {"folder": str(folder)}})
+    first = fingerprint(study)
+    # results may be written beside the data, and a run of tomorrow may lie there already
+    (folder / "predictions.csv").write_text("a\n1\n")
+    (folder / "wednesday.csv").write_text("a\n1\n")
+    assert fingerprint(study) == first
+    for name in ("monday.dat", "TUESDAY.CSV", "lve.csv", "runs.csv"):
+        kept = (folder / name).read_text()
+        (folder / name).write_text(kept.rstrip("\n") + " \n")
+        assert fingerprint(study) != first, name
+        (folder / name).write_text(kept)
+    assert fingerprint(study) == first
+
+
 def test_a_run_folder_resumes_and_refuses_another_study(tmp_path):
     folder = RunFolder(tmp_path / "out", "one")
     folder.save("part", {"x": [0.1, 1e-300]})

@@ -163,7 +163,8 @@ def total_stress(stress, velocity_gradient{structured}):
 def simulate_shear(shear_rate, times, step=0.02):
     """Return shear stress, N1 and N2 in Pa at times in s, each of their shape.
 
-    shear_rate: function of time in s, in 1/s. times: increasing from 0, where the fluid is at rest.
+    shear_rate: function of time in s, in 1/s. times: increasing; the fluid is at rest at 0, whether
+    that is one of them or not.
     step: of the fourth-order Runge-Kutta method, in units of the shortest relaxation time or of
     the time of unit strain. Modes much shorter than the flow need many steps.
     """
@@ -189,23 +190,24 @@ S|        structure = state[0, {last}:]
         total = total_stress(stress, gradient(t){structured})
         return total[0, 1], total[0, 0] - total[1, 1], total[1, 1] - total[2, 2]
 
-    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size}))
+    if not np.all(np.diff(times, prepend=0.0) >= 0.0):
+        raise ValueError("times must increase from 0, where the fluid is at rest")
+    t, state = 0.0, np.zeros((len(MODULUS_PA), {size}))
 S|    state[:, {last}:] = STRUCTURE_AT_REST
-    rows = [components(t, state)]
-    for end in times[1:]:
-S|        structure = state[0, {last}:]
-        shortest = np.min({time_factor}RELAXATION_TIME_S)
-        fastest = max(1.0 / shortest, abs(shear_rate(t)), abs(shear_rate(end)))
-        n = max(1, int(np.ceil((end - t) * fastest / step)))
-        h = (end - t) / n
-        for _ in range(n):
+    rows = []
+    for end in map(float, times):
+        while t < end:
+S|            structure = state[0, {last}:]
+            shortest = np.min({time_factor}RELAXATION_TIME_S)
+            fastest = max(1.0 / shortest, abs(shear_rate(t)), abs(shear_rate(end)))
+            left = max(1, int(np.ceil((end - t) * fastest / step)))
+            h = (end - t) / left
             k1 = change(t, state)
             k2 = change(t + 0.5 * h, state + 0.5 * h * k1)
             k3 = change(t + 0.5 * h, state + 0.5 * h * k2)
             k4 = change(t + h, state + h * k3)
             state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            t += h
-        t = float(end)
+            t = end if left == 1 else t + h
         rows.append(components(t, state))
     return tuple(np.array(rows).T)
 '''
