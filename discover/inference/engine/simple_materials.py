@@ -230,8 +230,12 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     laws = (*_WEIGHED[control], *((KELVIN_VOIGT,) if from_rest else ()))
     fits = {law: _fitted(fitter, law) for law in (_NO_MATERIAL, *laws)}
     nothing = fits.pop(_NO_MATERIAL)[1].log_evidence
-    lead = dict.fromkeys((HERSCHEL_BULKLEY, KELVIN_VOIGT), _AHEAD)
-    law = max(fits, key=lambda name: fits[name][1].log_evidence - lead.get(name, 0.0))
+
+    def led(law: str) -> float:
+        lead = _AHEAD if law in (HERSCHEL_BULKLEY, KELVIN_VOIGT) else 0.0
+        return fits[law][1].log_evidence - lead
+
+    law = max(fits, key=led)
     fitted, fit = fits[law]
     rank = fit.log_evidence + problem.log_odds_of(1.0)
     if law not in _NAMED.get(control, laws) or not np.isfinite(rank):
