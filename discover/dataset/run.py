@@ -1,7 +1,7 @@
 """Runs and data sets as the rest of the software sees them: SI units, checked."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import Any
@@ -143,11 +143,6 @@ class Run(NotebookView):
                 f"time {its} must start at or after 0 and increase strictly. Sort the samples and "
                 "remove repeated times."
             )
-        if self.protocol.control == "rate" and not self.time[-1] > 0:
-            raise InputError(
-                f"The run {self.name!r} has one sample, at time 0, before anything has flowed. "
-                "Give later ones, or leave the run out."
-            )
         if not 0 < self.clock_factor < math.inf:
             raise InputError(f"The clock factor {its} must be positive; got {self.clock_factor}.")
         if not np.isfinite(self.rate_before):
@@ -284,8 +279,19 @@ class Run(NotebookView):
         return replace(self, **kept)
 
 
+def require_later_samples(runs: Iterable[Run]) -> None:
+    """Refuse a run at a given rate that ends where it begins."""
+    for run in runs:
+        if run.protocol.control == "rate" and not run.time[-1] > 0.0:
+            raise InputError(
+                f"The run {run.name!r} has one sample, at time 0, before anything has flowed. "
+                "Give later ones, or leave the run out."
+            )
+
+
 def require_signal(runs: Sequence[Run]) -> None:
-    """Refuse runs of which none can teach a law."""
+    """Refuse runs of which none can teach a law, and one that nobody can follow."""
+    require_later_samples(runs)
     names = ", ".join(run.name for run in runs[:3]) + (" …" if len(runs) > 3 else "")
     flows, stressed = (any(run.flows for run in runs), any(np.any(run.stress) for run in runs))
     if not runs or (flows and stressed):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.material_functions import as_compared
-from discover.dataset.run import Run
+from discover.dataset.run import Run, require_later_samples
 from discover.errors import InputError
 from discover.first_use import require_double
 from discover.forward.flow_batch import FlowBatch
@@ -48,6 +48,7 @@ def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool =
                 f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__} "
                 f"that holds a {type(run).__name__}. {_MAKE}"
             )
+    require_later_samples(listed)
     longest = float(np.max(np.asarray(relaxation_time)))
     return [waiting(run, longest, relaxes) for run in as_compared(listed)]
 

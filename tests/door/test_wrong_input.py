@@ -56,7 +56,6 @@ class WithUnit:
         (lambda: run(rate=0.5), "rate of the run 'a' must be a list or an array of numbers"),
         (lambda: run(time=TIMES[:, None]), "an array of shape"),
         (lambda: run(time=[], rate=[], stress=[]), "has no samples"),
-        (lambda: run(time=[0.0], rate=[0.5], stress=[0.0]), "one sample, at time 0"),
         (lambda: run(time=TIMES[::-1]), "increase strictly"),
         (lambda: run(time=TIMES - 1.0), "at or after 0"),
         (lambda: run(rate=RATES[:2]), r"must have shape \(31,\) like its time; got \(2,\)"),
@@ -295,6 +294,17 @@ def test_a_table_in_place_of_a_data_set_is_refused_with_what_makes_one_of_it(lea
     for table in (SAMPLES, SAMPLES[["time_s", "stress_Pa"]].to_numpy()):
         with pytest.raises(dc.InputError, match=f"{type(table).__name__} .*from_dataframe"):
             learner().fit(table)
+
+
+def test_a_run_that_ends_where_it_begins_can_be_shown_but_not_followed():
+    # of two runs one has lost all samples but the first
+    rest = SAMPLES.head(1).assign(run="b", stress_Pa=0.2)
+    data = dc.from_dataframe(pd.concat([SAMPLES, rest]))
+    assert data.table().loc[1, "samples"] == 1
+    said = "'b' has one sample, at time 0"
+    for call in (dc.TensorSINDy().fit, dc.close_loop, lambda one: dc.fit("ucm", one)):
+        with pytest.raises(dc.InputError, match=said):
+            call(data)
 
 
 def test_levels_of_an_index_that_have_names_are_columns():
