@@ -129,6 +129,24 @@ def test_a_maxwell_fluid_and_a_power_law_are_none_of_them():
     assert material_in([flow_curve(lambda r: 3.0 * r**0.5)]) is None
 
 
+@pytest.mark.parametrize(
+    ("stress", "law"),
+    [
+        (lambda r: 3.0 * r**0.5, "power_law"),
+        (lambda r: (0.1 + 4.9 * (1.0 + (0.8 * r) ** 2.0) ** (-0.3)) * r, "carreau_yasuda"),
+    ],
+)
+def test_a_flow_curve_that_thins_shows_no_elasticity_where_no_time_is_known(stress, law):
+    free = ["modulus_Pa", "relaxation_time_s"]
+    declared = DeclaredModel.named("ucm", {}, [1.0], [1.0], free=free)
+    curve = Dataset("curve", (flow_curve(stress),))
+    found = run_loop(curve, declared, effects=FEW, max_effects=1)
+    assert found.material is not None
+    assert found.material.law == law
+    # control: beside a time that is known the same curve is one of a fluid that relaxes
+    assert material_in(curve.runs) is None
+
+
 def test_a_loop_names_a_yield_stress_with_its_constants_and_python():
     data = Dataset("carbopol", (flow_curve(lambda r: 15.0 + 4.0 * r**0.5),))
     found = run_loop(data, DeclaredModel.named("ucm", {}, [1.0], [1.0]))

@@ -43,8 +43,8 @@ _VISCOUS = NEWTONIAN, POWER_LAW, CARREAU_YASUDA, HERSCHEL_BULKLEY
 _WEIGHED = {"rate": _VISCOUS, "steady": _VISCOUS, "oscillation": (NEWTONIAN, KELVIN_VOIGT)}
 """Hypotheses by what was imposed; a solid too where strains since rest are known."""
 
-_NAMED = {"steady": (NEWTONIAN, HERSCHEL_BULKLEY)}
-"""Of flow curves: any law that relaxes has one too, that thins as a viscous fluid may."""
+_BESIDE_A_TIME = NEWTONIAN, HERSCHEL_BULKLEY
+"""What a flow curve shows of a fluid whose relaxation time is known: such a fluid thins too."""
 
 _RELAXING = {"rate": (MAXWELL, _GOING_ON, TWO_MODES), "oscillation": (MAXWELL, TWO_MODES)}
 """Fluids that a solid must differ from: of times within the record, for one that relaxes later is
@@ -238,7 +238,8 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     law = max(fits, key=led)
     fitted, fit = fits[law]
     rank = fit.log_evidence + problem.log_odds_of(1.0)
-    if law not in _NAMED.get(control, laws) or not np.isfinite(rank):
+    knows_time = fitted.is_curve and 1 not in problem.declared.free_positions
+    if (knows_time and law not in _BESIDE_A_TIME) or not np.isfinite(rank):
         return None
     noise = fit.noise.sizes[fitter.rows.run] * fitter.rows.size
 
