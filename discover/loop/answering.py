@@ -40,8 +40,6 @@ from discover.words import (
 
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
 _SETTLED = 0.95  # Probability from which on nothing is said of other laws
-# Misfit over the change from sample to sample up to which a simple material leaves only noise
-_TO_NOISE = 1.5
 
 LAW_OF_EFFECT = {
     "giesekus_mobility": "giesekus",
@@ -159,7 +157,6 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
     to_noise = result.verdict in EXPLAINED
-    to_noise &= result.error_after.fit <= _TO_NOISE * result.noise_floor
     left = by_quantity.of_fitted(result.records, result.error_after.fit, result.noise_floor)
     answer = Answer(
         material.title,
