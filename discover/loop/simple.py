@@ -41,8 +41,11 @@ def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
     knows_times = 1 not in task.declared.free_positions
     if material.kind == "viscous" and knows_times and before.fit <= _AS_WELL * after.fit:
         return None  # the declared law has this viscosity, and may have more
+    explained = probability >= 0.5
     left = [record.relative_residual[1] for record in records if not record.held_out]
-    noise = float(np.mean([fast_part(one) if len(one) > 2 else 0.0 for one in left]))
+    # where it is all there is, what it leaves is the noise
+    fast = [fast_part(one) for one in left if len(one) > 2]
+    noise = material.error if explained or not fast else float(np.mean(fast))
     parameters = {
         one.name: StageParameter(one.value, one.ci95 or (one.value, one.value), one.unit)
         for one in material.constants
@@ -54,12 +57,11 @@ def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
     )  # fmt: skip
     values = {one.name: one.value for one in material.constants}
     explanation = Explanation((effect,), probability, after, {effect: values})
-    explained = probability >= 0.5
     verdict = "effects_added" if explained else "unexplained"
     return LoopResult(
-        verdict, before, after, noise or after.fit, (stage,),
+        verdict, before, after, noise, (stage,),
         {
-            "structured": not explained, "error": after.fit, "noise_floor": noise or after.fit,
+            "structured": not explained, "error": after.fit, "noise_floor": noise,
             "outliers": sum(map(len, task.spikes.values())), "outlier_times_s": task.spikes,
             "untested": why_untested(len(values), task.fitted, task.held_out),
             "description": f"A {material.title} is likelier than all laws that relax.",
