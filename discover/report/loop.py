@@ -20,8 +20,6 @@ from discover.report.plots.loop.residual import (
     waterfall_picture,
 )
 from discover.report.plots.loop.runs import (
-    AS_DECLARED,
-    WITH_EFFECTS,
     free_form_picture,
     lissajous_picture,
     next_test_picture,
@@ -80,11 +78,6 @@ def write_loop(
         kinds=KINDS,
         remaining=remaining_rows(result),
         small_faults=SMALL_FAULTS,
-        readings=[
-            (f"{name[:1].upper()}{name[1:]}", reading.sentences)
-            for name, reading in zip((AS_DECLARED, WITH_EFFECTS), result.readings, strict=True)
-            if name == AS_DECLARED or result.stages
-        ],
         pictures=drawn,
         run=run
         or made_by(

@@ -25,7 +25,7 @@ from discover.report.plots.loop.residual import (
     waterfall_picture,
 )
 from discover.report.plots.loop.runs import lissajous_picture, runs_picture
-from discover.report.plots.style import figure, in_last_cycle, make_percentage, picture
+from discover.report.plots.style import figure, make_percentage, picture
 from discover.study import RunFolder
 
 
@@ -357,12 +357,6 @@ def test_no_latex_shows_in_the_page_of_a_yield_stress(tmp_path):
     body = re.sub(hidden, "", page[page.index("<body") :], flags=re.S)
     assert 'class="formula"' in body
     assert "\\" not in body
-
-
-def test_the_last_cycle_is_one_period_long():
-    record = oscillating()
-    shown = record.time[in_last_cycle(record.time, 1.0)]
-    assert shown[-1] - shown[0] == pytest.approx(2.0 * np.pi, rel=0.03)
 
 
 def test_a_short_axis_of_errors_has_a_number_to_read():
