@@ -44,9 +44,9 @@ class TBNNUDE(RunPrediction):
     Parameters
     ----------
     recipe
-        ``"default"`` (Levenberg–Marquardt, constants first; see `recipe_default`), ``"thorough"``
-        (the same, with nothing left out where there are many modes, runs and steps), ``"paper"``
-        (Adam, 7,200 iterations; see `recipe_paper`), or a `DefaultRecipe` or `PaperRecipe`.
+        ``"default"`` (least squares, constants first), ``"thorough"`` (the same, with nothing left
+        out where there are many modes, runs and steps), ``"paper"`` (Adam, 7,200 iterations), or a
+        `DefaultRecipe` or `PaperRecipe`.
     modulus, relaxation_time
         G in Pa and λ in s, numbers, or arrays with one value for each mode.
     known_relaxation
