@@ -47,10 +47,6 @@ class Records(eqx.Module):
         """Whether a value was recorded and is looked at."""
         return np.asarray(self.weight) > 0
 
-    def only(self, keep: Bool[np.ndarray, " runs"]) -> "Records":
-        """Return the records of which only some runs are looked at."""
-        return Records(self.recorded, on_device(np.where(keep[:, None], self.weight, 0.0)))
-
     def residual(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
         """Return predictions minus records, weighted; zero where none is looked at."""
         return jnp.where(self.weight > 0, self.weight * (predicted - self.recorded), 0.0)

@@ -98,18 +98,6 @@ def work(problem: TrainingProblem) -> float:
     return float(problem.modulus.size * problem.flows.n_steps)
 
 
-def train_constants(
-    problem: TrainingProblem,
-    linear_relaxation: bool,
-    recipe: DefaultRecipe,
-    base_law: AbstractConstitutiveLaw | None,
-) -> Trained:
-    """Return the law of few constants that explains some runs: the recipe's first stage alone."""
-    session = Session(problem, recipe, None)
-    penalised, law = session.constants(without_network(linear_relaxation, base_law))
-    return _finish(session, law, penalised, False, "constant coefficients")
-
-
 def train_along(
     problem: TrainingProblem, key: PRNGKeyArray, found: TensorBasisNetwork,
     groups: Sequence[Sequence[int]], recipe: DefaultRecipe, progress: Progress | None,
