@@ -49,7 +49,6 @@ def outcome(learner, number, predicted):
     path = [{**ROW, "size": 0, "support": [], "misfit": 0.4}, {**ROW}]
     for row in path:
         row["held_out"] = number
-        row["held_out_by_run"] = {"a": 0.01, "b": number, "c": 0.05}
     details = {
         "path": path,
         "inclusion": {"sigma.sigma": 0.5},

@@ -8,7 +8,7 @@ from scipy.special import jv
 import tensor_library as tl
 from discover.laws import Fluid, JohnsonSegalman, LibraryExpansion, make_law
 from discover.protocols import oscillatory_shear, start_up, step_rates
-from discover.report.plots.comparison.selection import third_harmonic
+from discover.report.plots.comparison.oscillations import third_harmonic
 from discover.simulate import simulate
 
 HISTORIES = {

@@ -11,7 +11,7 @@ from discover import words
 from discover.comparison import Comparison, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
-from discover.equations.spelling.markup import law_element, sum_elements, term_element
+from discover.equations.spelling.markup import law_element, sum_elements
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
@@ -24,39 +24,6 @@ from discover.report.wording import (
     terms_text,
     worst,
 )
-
-
-def selection(comparison: Comparison) -> dict[str, Any] | None:
-    """Return the sparse learner's path, or None where there is none.
-
-    A misfit is None where a law diverges in a run left out.
-    """
-    sparse = comparison.outcomes.get("tensor_sindy")
-    path = [] if sparse is None else sparse.details.get("path") or []
-    if sparse is None or not path:
-        return None
-    highest = max((row["log_evidence"] for row in path), default=0.0)
-    rows = [
-        {
-            "size": row["size"],
-            "math": " + ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
-            "misfit": row["misfit"],
-            "held_out": row["held_out"],
-            "range": list(_by_run(row).values()),
-            "behind": highest - row["log_evidence"],
-        }
-        for row in path
-    ]
-    spelled = _titles(comparison)
-    runs = [
-        {"title": spelled.get(name, name), "errors": [_by_run(row).get(name) for row in path]}
-        for name in _by_run(path[0])
-    ]
-    return {"rows": rows, "runs": runs}
-
-
-def _by_run(row: Mapping[str, Any]) -> Mapping[str, float | None]:
-    return row.get("held_out_by_run") or {}
 
 
 def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
