@@ -7,9 +7,8 @@ from typing import Any
 import pandas as pd
 
 from discover.answer import Answer, HasAnswer
-from discover.comparison.bands import Band
 from discover.comparison.classical import ClassicalFit
-from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
+from discover.comparison.flows import Band, Flow, Stresses, of_recorded, relative_errors
 from discover.comparison.outcome import LearnerOutcome, Placement, place
 from discover.comparison.rivals import Rival
 from discover.comparison.statements import IN_LIBRARY, Statement, outcome_equation
@@ -227,7 +226,9 @@ class Comparison(PageView, HasAnswer, SummaryView):
                 "terms": outcome.terms,
                 "errors": self._errors(name, self.judged),
                 "half_widths_of_members": {
-                    flow.name: outcome.half_widths(flow) for flow in self.judged
+                    flow.name: outcome.bands[flow.key].half_widths()
+                    for flow in self.judged
+                    if flow.key in outcome.bands
                 },
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "intervals_hold": IN_LIBRARY if holds else "no",

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from discover.comparison.bands import Band, flow_bands
+from discover.comparison.bands import flow_bands
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import (
     DRAWN,
+    Band,
     Flow,
     comparison_flows,
     prepared,
@@ -135,9 +136,8 @@ def compare(
     made_of, truth = study.data.synthetic, None
     if made_of is not None and declared.law_name == "ucm":
         truth = true_terms(made_of.law, made_of.parameters, study.model.known_relaxation)
-    left = lacks_of_fit(
-        outcomes, frame.flows, expectation_of(study, declared, data), options.use_normal_stresses
-    )
+    expectation = expectation_of(study, declared, data)
+    left = lacks_of_fit(outcomes, data.fit.runs, expectation, options.use_normal_stresses)
     if found.ended().verdict == "no_signal":
         outcomes = {
             name: replace(one, terms=(), message=_NO_LAW, details={})

@@ -26,7 +26,12 @@ from discover.loop.from_posterior import Ended
 from discover.loop.loop import without_fluid
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
-from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model
+from discover.study.declared_model import (
+    MODE_CONSTANTS,
+    StudyModel,
+    forward_model,
+    linear_start,
+)
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Verdict
 from discover.summary_view import Estimate
@@ -193,7 +198,7 @@ def _declared(
             raise InputError(f"base must be a Fluid; got a {type(base).__name__}.")
         fluid = Fluid(built, base.modulus, base.relaxation_time, base.solvent_viscosity)
     elif one_mode:
-        estimate = dict(zip(MODE_CONSTANTS, _estimated_mode(runs), strict=True))
+        estimate = dict(zip(MODE_CONSTANTS, linear_start(runs), strict=True))
         fluid = Fluid(built, *((estimate | start | fixed)[name] for name in MODE_CONSTANTS))
     else:
         fluid = Fluid.from_sweep(data.linear_sweep, built)
@@ -207,19 +212,6 @@ def _declared(
         raise InputError("Modes come from base or the linear sweep; they cannot be fixed here.")
     free += [name for name in asked if name not in fixed]
     return with_known(declared_fluid(fluid, data), effects, free)
-
-
-def _estimated_mode(runs: Sequence[Run]) -> tuple[float, float]:
-    """Return a modulus in Pa and a time in s from the largest stresses, rates and durations.
-
-    The stress of a steady flow is about Gλγ̇, and a flow that shows relaxation lasts about λ or has
-    a rate of about 1/λ.
-    """
-    rates = [float(np.max(np.abs(run.rate))) for run in runs]
-    rate = float(np.median([r for r in rates if r > 0.0] or [1.0]))
-    time = 1.0 / rate
-    stress = float(np.median([np.max(np.abs(run.stress)) for run in runs])) or 1.0
-    return stress / (time * rate), time
 
 
 def _names_and_ranges(

@@ -12,12 +12,13 @@ from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
+from discover.dataset.records.thinning import without_spikes
 from discover.dataset.run import Run
 from discover.forward import make_batch
 from discover.forward.of_fluids import followed, observed, pieces_in_time
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
 from discover.learners.results import estimates_of
-from discover.learners.runs import as_runs, require_signal
+from discover.learners.runs import as_runs, left_by, require_signal
 from discover.learners.settings import (
     ARITHMETIC,
     check_settings,
@@ -25,8 +26,7 @@ from discover.learners.settings import (
     require_known_rate,
 )
 from discover.linear_algebra_threads import in_one_thread
-from discover.protocols.between_samples import sampling_interval
-from discover.statistics import LackOfFit, lack_of_fit
+from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
 
@@ -67,7 +67,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
 
     @in_one_thread
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
-        """Find the law of runs `X`, or of a data set; `y` is ignored.
+        """Find the law of runs `X`, or of a data set, without outliers; `y` is ignored.
 
         Raises InputError if a parameter or a run is unusable.
         """
@@ -76,7 +76,8 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         self._check_parameters()
         known = known_part(self)
         # once, for it may be read only once
-        runs = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
+        whole = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
+        runs = [without_spikes(run)[0] for run in whole]
         require_signal(runs)
         require_known_rate(known, runs)
         self._left = None
@@ -106,18 +107,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         return self._left
 
     def _what_it_leaves(self, runs: list[Run]) -> LackOfFit:
-        predicted = self._predict_runs(runs)
-        for run, values in zip(runs, predicted, strict=True):
-            if not np.all(np.isfinite(values)):
-                nan = float("nan")
-                reason = f"the integration diverges in {run.name}"
-                return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
-        found = lack_of_fit(
-            [values - run.recorded for run, values in zip(runs, predicted, strict=True)],
-            [run.recorded for run in runs],
-            even=[1.0 / run.sizes(run.recorded) for run in runs],
-            intervals=[sampling_interval(run.time, run.protocol, run.quantity) for run in runs],
-        )
+        found = left_by(runs, self._predict_runs(runs))
         if found.verdict == "unexplained" and found.misfit <= ARITHMETIC:
             return replace(found, verdict="explained", reason="the rest is arithmetic")
         return found

@@ -16,7 +16,7 @@ from fewer_hypotheses import few_candidates
 from standing_alone import SCRIPT, stands_alone
 
 from discover.comparison import compare
-from discover.comparison.bands import Band
+from discover.comparison.flows import Band
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison.report import write_comparison

@@ -30,14 +30,12 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the errors in flows that no fit saw, with half of the band where there is one."""
     rows = []
     for flow in comparison.judged:
-        band = comparison.claimed(flow)
-        of_posterior = {} if band is None else band.half_widths()
         cells = []
         for who in ("before", *comparison.outcomes):
+            band = None if who == "before" else comparison.outcomes[who].bands.get(flow.key)
             if who == "tensor_sindy":
-                widths = of_posterior if comparison.determined_terms else {}
-            else:
-                widths = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+                band = comparison.claimed(flow) if comparison.determined_terms else None
+            widths = {} if band is None else band.half_widths()
             finite = {name: width for name, width in widths.items() if known(width)}
             law = comparison.before if who == "before" else comparison.outcomes[who].predictions
             cells += [

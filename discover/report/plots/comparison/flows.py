@@ -175,7 +175,8 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
     members = None if network is None else network.bands.get(flow.key)
     if members is not None:
         label = "networks that fit as well"
-        limits.append((*members[quantity], look.learner_style("tbnn_ude")["color"], label))
+        colour = look.learner_style("tbnn_ude")["color"]
+        limits.append((members.low[quantity], members.high[quantity], colour, label))
     band = comparison.claimed(flow)
     if band is not None and np.any(np.isfinite(band.low[quantity])):
         limits.append((band.low[quantity], band.high[quantity], look.SPARSE, "95 % band"))
