@@ -7,15 +7,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.noise.noise_model import Rows, rms
-from discover.statistics.noise.outliers import stray
+from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.same_correlation import same_correlation_probability
 from discover.statistics.noise.whiteness import (
     FEWEST_FAST,
     FEWEST_TESTED,
     SIGNIFICANCE,
     noise_probability,
-    repeated,
 )
 from discover.statistics.residual import (
     STRUCTURE,
@@ -62,7 +60,6 @@ class LackOfFit:
     noise: float  # relative noise of the records, mean over runs
     lag_one_correlation: float  # of neighbouring residuals, mean over runs
     probability: float | None
-    outliers: int = 0  # number of samples that are far outside the noise and do not vote
     reason: str = ""  # the verdict in one sentence
 
     @property
@@ -89,8 +86,6 @@ def lack_of_fit(
 ) -> LackOfFit:
     """Return what a model leaves of the records, and whether that is noise.
 
-    Samples that are outliers (`stray`) are counted and left out.
-
     `residuals`: prediction minus measurement of each fitted run, in any unit. `measured`: the
     measurements, in the same unit. `expectation`: what a complete model may leave; by default noise
     of unknown size. `even`: by what records and residuals are multiplied so that their noise has
@@ -105,7 +100,11 @@ def lack_of_fit(
             for rows in (residuals, measured)
         )
     expectation = expectation or Expectation()
-    rows, records, outliers = _without_outliers(residuals, measured)
+    records = [np.asarray(record, dtype=float) for record in measured]
+    rows = [
+        np.asarray(r, dtype=float) / (rms(m) or 1.0)
+        for r, m in zip(residuals, records, strict=True)
+    ]
     further = () if intervals is None else (same_correlation_probability(rows, intervals),)
     # a run counts as much as any other: one too short to tell its noise could decide alone
     telling = [i for i, row in enumerate(rows) if len(row) >= FEWEST_FAST]
@@ -144,9 +143,7 @@ def lack_of_fit(
         reason = f"the residual ({percent_of(misfit)}) is more than noise ({percent_of(expected)})"
     else:
         reason = f"the residual ({percent_of(misfit)}) has {pattern}"
-    if outliers:
-        reason += f"; outliers that do not count: {outliers}"
-    return LackOfFit(verdict, misfit, floor, correlation, probability, outliers, reason)
+    return LackOfFit(verdict, misfit, floor, correlation, probability, reason)
 
 
 _PATTERNED = {
@@ -156,21 +153,3 @@ _PATTERNED = {
     (False, True): "the linear data's error and what repeated runs differ by",
 }
 """What may have a pattern, by whether the noise is given and whether runs were repeated."""
-
-
-def _without_outliers(
-    residuals: Rows, measured: Rows
-) -> tuple[list[np.ndarray], list[np.ndarray], int]:
-    """Return residuals over the size of each record, the records, and the number of outliers."""
-    rows, records, outliers = [], [], 0
-    sizes = [rms(record) or 1.0 for record in measured]
-    again = repeated([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
-    for row, record in zip(residuals, measured, strict=True):
-        values, record = np.asarray(row, dtype=float), np.asarray(record, dtype=float)
-        off = stray(values, record)
-        # no knock comes at the same place of several runs
-        off[[at for at in again if at < len(off)]] = False
-        rows.append(values[~off] / (rms(record[~off]) or 1.0))
-        records.append(record[~off])
-        outliers += int(np.count_nonzero(off))
-    return rows, records, outliers

@@ -74,20 +74,6 @@ def test_noise_of_any_size_is_rarely_taken_for_structure(correlation, size):
     assert taken <= 2
 
 
-@pytest.mark.parametrize("share", [0.02, 0.1])
-def test_outliers_are_counted_and_do_not_vote(share):
-    generator = np.random.default_rng(3)
-    noise = 0.1 * generator.standard_normal(SAMPLES)
-    off = generator.random(SAMPLES) < share
-    spikes = 3.0 * off * generator.choice([-1.0, 1.0], SAMPLES)
-    found = lack_of_fit([noise + spikes], [WAVE - noise - spikes])
-    assert found.outliers > 0.7 * np.count_nonzero(off)
-    assert found.noise < 0.35 * np.sqrt(np.mean((noise + spikes) ** 2)) / 7.07
-    clean = lack_of_fit([noise], [WAVE - noise])
-    assert (clean.outliers, clean.verdict) == (0, "explained")
-    assert clean.noise == pytest.approx(0.1 / 7.07, rel=0.2)
-
-
 def test_what_looks_like_correlated_noise_is_as_large_as_all_that_is_left():
     residual, record = 0.3 * correlated(0.85, 0), WAVE
     found = lack_of_fit([residual], [record])

@@ -27,7 +27,6 @@ def test_a_start_that_every_run_misses_is_no_noise(runs):
     residual, measured = newtonian_missed_at_the_start()
     left = lack_of_fit([*residual[:runs]], [*measured[:runs]])
     assert left.verdict == "unexplained"
-    assert left.outliers == 0
     # of 61 samples in one run the size is known to 10 %, to half of that in five
     assert left.noise == pytest.approx(NOISE, rel=0.25)
 
@@ -47,17 +46,10 @@ def test_a_loud_start_that_differs_from_run_to_run_is_noise():
     assert taken <= 3
 
 
-@pytest.mark.parametrize(
-    ("places", "verdict", "outliers"),
-    [((7, 19, 30, 41, 52), "explained", 5), ((30,) * 5, "unexplained", 0)],
-)
-def test_knocks_at_different_places_are_outliers_and_at_one_place_structure(
-    places, verdict, outliers
-):
+def test_knocks_at_one_place_of_several_runs_are_structure():
     left = noise(1)
-    left[np.arange(5), places] += 0.5
-    told = lack_of_fit([*left], [*(1.0 - left)])
-    assert (told.verdict, told.outliers) == (verdict, outliers)
+    left[:, 30] += 0.5
+    assert lack_of_fit([*left], [*(1.0 - left)]).verdict == "unexplained"
 
 
 def test_few_samples_do_not_hide_a_misfit_in_the_noise():

@@ -17,8 +17,6 @@ from discover.statistics.noise.smooth_misfit import LARGEST_CORRELATION, smooth_
 
 _STANDS_OUT = 6.0  # robust standard deviations of the neighbourhood
 _SAME_PLACE_BESIDE, _SAME_PLACE_NEIGHBOURHOOD = 5, 25
-_SAME_PLACE_REPEATED = 1e-3
-"""Probability below which samples at one place are no chance."""
 
 
 def same_place_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
@@ -28,21 +26,11 @@ def same_place_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     1]. First and last place, where an imperfect start or end shows, count for half of those asked.
     `rows`: residuals of each run, in a unit in which runs compare.
     """
-    return float(min((probability for _, probability in _places(rows)), default=1.0))
-
-
-def repeated(rows: Sequence[Float[np.ndarray, " _"]]) -> list[int]:
-    """Return the places at which samples stand out in several runs alike; −1 is the last."""
-    return [at for at, probability in _places(rows) if probability <= _SAME_PLACE_REPEATED]
-
-
-def _places(rows: Sequence[Float[np.ndarray, " _"]]) -> list[tuple[int, float]]:
-    """Return where samples of two runs or more stand out, and how probable it is that they do."""
     length = min(map(len, rows), default=0)
     if len(rows) < 2 or length < _SAME_PLACE_BESIDE:
-        return []
+        return 1.0
     out = [_standing_out(np.asarray(row, dtype=float)) for row in rows]
-    found = []
+    least = 1.0
     for at in [*range(length), -1]:
         if sum(bool(loud[at]) for loud in out) < 2:
             continue
@@ -50,8 +38,8 @@ def _places(rows: Sequence[Float[np.ndarray, " _"]]) -> list[tuple[int, float]]:
         error = float(np.std(values, ddof=1)) / np.sqrt(len(values))
         ratio = abs(float(np.mean(values))) / max(error, np.finfo(float).tiny)
         tried = 2 * (2 if at in (0, -1) else length)
-        found.append((at, min(1.0, tried * 2.0 * float(student.sf(ratio, len(values) - 1)))))
-    return found
+        least = min(least, tried * 2.0 * float(student.sf(ratio, len(values) - 1)))
+    return least
 
 
 def _standing_out(row: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
