@@ -7,7 +7,7 @@ from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome, physics_of, simulated
 from discover.dataset.run import Run
-from discover.laws import Fluid, UpperConvectedMaxwell
+from discover.laws import Fluid
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.progress import Progress, silent
@@ -27,34 +27,25 @@ def train(
     part.
     """
     options = study.compare
-    plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
-    shared = {
-        "modulus": model.modulus,
-        "relaxation_time": model.relaxation_time,
-        "known_relaxation": study.model.known_relaxation,
-        "base_law": None if plain_maxwell else model.law,
-        "solvent_viscosity": model.solvent_viscosity,
-    }
     library = study_library(study)
     if learner == "tensor_sindy":
         from discover.learners.tensor_sindy import TensorSINDy
 
         sparse = TensorSINDy(
+            base=replace(model.fluid, modulus_covariance=model.modulus_covariance),
             library=library,
             optimizer=options.optimizer,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
-            modulus_covariance=model.modulus_covariance,
-            **shared,
         ).fit(list(runs))
         return sparse.result_, sparse.fluid_
     if learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 
         estimator = TBNNUDE(
-            recipe=options.recipe, n_members=options.members, quick=options.quick,
-            projection_library=library, progress=progress, random_state=seed, **shared,
+            base=model.fluid, recipe=options.recipe, n_members=options.members, quick=options.quick,
+            projection_library=library, progress=progress, random_state=seed,
         )  # fmt: skip
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_

@@ -47,6 +47,7 @@ _STRAIN_STEP = 0.2
 class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     """What is common to estimators: what they are fitted to, prediction, score, law, file."""
 
+    base: "Fluid | None"
     fluid_: "Fluid"
     result_: "LearnerResult"
     runs_: tuple[Run, ...]
@@ -74,7 +75,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         del y
         check_settings(self.get_params(deep=False))
         self._check_parameters()
-        known = known_part(self)
+        known = known_part(self.base)
         # once, for it may be read only once
         whole = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
         runs = [without_spikes(run)[0] for run in whole]

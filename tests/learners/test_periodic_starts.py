@@ -8,6 +8,7 @@ from differences import told_as_differences
 from independent import Giesekus, oscillation
 
 from discover.dataset import Run
+from discover.laws import Fluid
 from discover.learners.runs import as_runs
 from discover.learners.tbnn_ude.problem import make_problem as training_problem
 from discover.learners.tbnn_ude.session import without_network
@@ -56,7 +57,7 @@ def test_only_what_does_not_relax_by_itself_waits():
 @pytest.mark.slow
 def test_a_slow_mode_is_learned_from_two_cycles():
     runs = [swing(strain, noise=0.01) for strain in (0.5, 2.0)]
-    fitted = TensorSINDy(LIBRARY, modulus=MODULUS, relaxation_time=TIME).fit(runs)
+    fitted = TensorSINDy(LIBRARY, base=Fluid(modulus=MODULUS, relaxation_time=TIME)).fit(runs)
     (term,) = fitted.result_.terms
     assert term.term == "sigma.sigma"
     low, high = term.ci95

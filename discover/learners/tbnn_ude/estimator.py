@@ -14,12 +14,12 @@ import numpy as np
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
+from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
-from discover.learners.settings import PerMode, default_library, law_below
+from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
@@ -47,15 +47,9 @@ class TBNNUDE(RunPrediction):
         ``"default"`` (least squares, constants first), ``"thorough"`` (the same, with nothing left
         out where there are many modes, runs and steps), ``"paper"`` (Adam, 7,200 iterations), or a
         `DefaultRecipe` or `PaperRecipe`.
-    modulus, relaxation_time
-        G in Pa and λ in s, numbers, or arrays with one value for each mode.
-    known_relaxation
-        Whether −σ is known. If not, the network has to find it too.
-    base_law
-        A known dimensionless law to which the network is added; by default UCM.
     base
-        The known `Fluid`, in place of `modulus`, `relaxation_time`, `base_law`,
-        `known_relaxation` and `solvent_viscosity`.
+        The known `Fluid` to whose law the network is added; by default UCM with 1 Pa and 1 s. With
+        ``UpperConvectedMaxwell(False)`` not even −σ is known: the network has to find it too.
     n_members
         Networks that reach the data by different ways (see `ensemble`). The likeliest of those that
         fit is taken, without noise the simplest; what they disagree on, the data leave open.
@@ -68,8 +62,6 @@ class TBNNUDE(RunPrediction):
         Seed of the initial weights.
     progress
         Called with a line of text and the fraction done, or None.
-    solvent_viscosity
-        η_s in Pa s.
 
     Attributes
     ----------
@@ -109,17 +101,12 @@ class TBNNUDE(RunPrediction):
     _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
     recipe: str | DefaultRecipe | PaperRecipe = "default"
-    modulus: PerMode = 1.0
-    relaxation_time: PerMode = 1.0
-    known_relaxation: bool = True
-    base_law: AbstractConstitutiveLaw | None = None
     n_members: int = 3
     projection_library: TermLibrary | None = None
     quick: bool = False
     random_state: int = 0
     progress: Progress | None = None
     base: Fluid | None = None
-    solvent_viscosity: float = 0.0
 
     def _learn(self, runs: list[Run], known: Fluid, shorten: bool = True) -> None:
         started = time.perf_counter()
