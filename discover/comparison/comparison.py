@@ -15,10 +15,10 @@ from discover.comparison.statements import IN_LIBRARY, Statement, outcome_equati
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
+from discover.learners.lack_of_fit import FitVerdict, LackOfFit
 from discover.learners.results import estimates_of
 from discover.loop.loop_result import LoopResult
 from discover.plain_numbers import plain
-from discover.statistics import FitVerdict, LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView, table_of
 from tensor_library.law_terms import LawTerm
 
@@ -39,8 +39,8 @@ class Comparison(PageView, HasAnswer, SummaryView):
     `outcomes`: by learner. `posterior`: of the search among laws, effects and terms with the
     learners' proposals. `bands`: predictions of the posterior with their 95 % bands, by the key of
     the flow. `shares`: probability of each learner's law among all fitted, were one of them all
-    there is. `lack_of_fit`: of each learner's law to the training runs. `truth`: terms that a
-    perfect learner would find, or None. `noise`: relative noise of synthetic data, or None.
+    there is. `truth`: terms that a perfect learner would find, or None. `noise`: relative noise of
+    synthetic data, or None.
     `rivals`, `statements`: what the data do not determine. `structure`: what the training flows can
     determine of the library; None where not asked. `classical`: classical laws fitted to the same
     runs. `seed`: of the learners. `known`: known part as an equation; None where it cannot be
@@ -57,7 +57,6 @@ class Comparison(PageView, HasAnswer, SummaryView):
     posterior: LoopResult
     bands: Mapping[str, Band] = field(default_factory=dict, repr=False)
     shares: Mapping[str, float] = field(default_factory=dict)
-    lack_of_fit: Mapping[str, LackOfFit] = field(default_factory=dict)
     truth: Sequence[LawTerm] | None = None
     noise: float | None = None
     rivals: Sequence[Rival] = ()
@@ -80,8 +79,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
         found = []
         rivals = [set(rival.law.coefficients) for rival in self.rivals]
         for name, outcome in self.outcomes.items():
-            left = self.lack_of_fit.get(name)
-            found += estimates_of(outcome.terms, left, rivals, (name,))
+            found += estimates_of(outcome.terms, outcome.left, rivals, (name,))
         for one in self.answer.estimates:
             found.append(replace(one, key=("answer", *one.key)))
         return found
@@ -89,6 +87,11 @@ class Comparison(PageView, HasAnswer, SummaryView):
     def to_dataframe(self) -> pd.DataFrame:
         """Return `errors_table` with flow and quantity as columns."""
         return self.errors_table().reset_index()
+
+    @property
+    def lack_of_fit(self) -> dict[str, LackOfFit]:
+        """What each learner's law leaves of the runs that it learned from."""
+        return {name: one.left for name, one in self.outcomes.items() if one.left is not None}
 
     @property
     def verdict(self) -> FitVerdict:
@@ -191,7 +194,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
     def _shown(self) -> Iterable[Any]:
         yield from self.answer.lines
         for name, left in self.lack_of_fit.items():
-            yield f"{left.verdict.replace('_', ' ')} by {name}: {left.reason}"
+            yield f"{name}: {left.described}"
         for name, outcome in self.outcomes.items():
             yield f"{name}: {outcome.message}"
             if self.known is not None:

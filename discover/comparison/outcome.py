@@ -8,19 +8,12 @@ import numpy as np
 
 from discover import identify
 from discover.comparison.flows import DRAWN, QUANTITIES, Band, Flow, Stresses, columns_of
-from discover.dataset.records.repeats import repeats_among
-from discover.dataset.run import Run
 from discover.identify.physics_flows import time_scale
 from discover.laws import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.lack_of_fit import LackOfFit
 from discover.learners.results import TermTables
-from discover.learners.runs import left_by
 from discover.plain_numbers import plain
-from discover.statistics import LackOfFit
-from discover.statistics.residual import Expectation
-from discover.study.data import StudyData
-from discover.study.declared_model import StudyModel
-from discover.study.schema import Study
 
 
 @dataclass(frozen=True)
@@ -40,6 +33,7 @@ class LearnerOutcome(TermTables):
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
     bands: Mapping[str, Band] = field(default_factory=dict)
+    left: LackOfFit | None = None  # of the runs that it learned from
 
     @classmethod
     def of(
@@ -70,6 +64,9 @@ class LearnerOutcome(TermTables):
                 key: Band(**{end: arrays(values) for end, values in own.items()})
                 for key, own in state["bands"].items()
             },
+            # JSON has no number that is none
+            "left": (left := state.get("left"))
+            and LackOfFit(**{key: np.nan if one is None else one for key, one in left.items()}),
         }
         return cls(**{**state, **read})
 
@@ -171,40 +168,6 @@ def _largest(values: np.ndarray) -> float:
 def _ratio(value: float, others: Sequence[float]) -> float:
     largest = max(others, default=0.0)
     return value / largest if largest > 0.0 else float("inf") if value > 0.0 else 0.0
-
-
-def expectation_of(study: Study, model: StudyModel, data: StudyData) -> Expectation:
-    """Return what a complete law may leave of the runs: noise, the sweep's own error, repeats."""
-    repeats, noise = repeats_among(list(data.dataset)), study.loop.noise
-    linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
-    told = 0.0 if repeats is None or noise is not None else repeats.error
-    return Expectation(noise, linear_error, told)
-
-
-def lacks_of_fit(
-    outcomes: Mapping[str, LearnerOutcome],
-    runs: Sequence[Run],
-    expectation: Expectation,
-    normal_stresses_used: bool = False,
-) -> dict[str, LackOfFit]:
-    """Return what each learner's law leaves of the fitted runs, and whether that is noise.
-
-    `outcomes`: by learner. `runs`: as recorded. `expectation`: what a complete law may leave.
-    `normal_stresses_used`: whether measured normal stresses were part of the fit.
-    """
-    told = [(run, run.name, "sigma12") for run in runs]  # whatever it is that a run records
-    if normal_stresses_used:
-        told += [(run.observing(one), run.name, one) for run in runs for one in run.beside]
-    told = [one for one in told if np.any(one[0].recorded)]
-    found = {}
-    for name, outcome in outcomes.items():
-        predicted = [
-            np.full(len(run), np.nan) if own is None else own[quantity]
-            for run, source, quantity in told
-            for own in [outcome.predictions[f"training/{source}"]]
-        ]
-        found[name] = left_by([run for run, *_ in told], predicted, expectation)
-    return found
 
 
 _PHYSICS_FLOWS = ("training", "held_out", "test")

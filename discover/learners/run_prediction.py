@@ -17,16 +17,15 @@ from discover.dataset.run import Run
 from discover.forward import make_batch
 from discover.forward.of_fluids import followed, observed, pieces_in_time
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
+from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.results import estimates_of
-from discover.learners.runs import as_runs, left_by, require_signal
+from discover.learners.runs import as_runs, require_signal
 from discover.learners.settings import (
-    ARITHMETIC,
     check_settings,
     known_part,
     require_known_rate,
 )
 from discover.linear_algebra_threads import in_one_thread
-from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
 
@@ -104,14 +103,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         """Lack of fit to the fitted runs; None of a file that does not say."""
         check_is_fitted(self, "fluid_")
         if getattr(self, "_left", None) is None and hasattr(self, "runs_"):
-            self._left = self._what_it_leaves(list(self.runs_))
+            errors = known_part(self.base).modulus_covariance
+            self._left = lack_of_fit(replace(self.fluid_, modulus_covariance=errors), self.runs_)
         return self._left
-
-    def _what_it_leaves(self, runs: list[Run]) -> LackOfFit:
-        found = left_by(runs, self._predict_runs(runs))
-        if found.verdict == "unexplained" and found.misfit <= ARITHMETIC:
-            return replace(found, verdict="explained", reason="the rest is arithmetic")
-        return found
 
     @property
     def text(self) -> str:

@@ -14,10 +14,7 @@ from discover.errors import InputError
 from discover.first_use import require_double
 from discover.forward.flow_batch import FlowBatch
 from discover.protocols import settled
-from discover.protocols.between_samples import sampling_interval
 from discover.protocols.kinematics import STATES
-from discover.statistics import LackOfFit, lack_of_fit
-from discover.statistics.residual import Expectation
 from discover.words import percent_of
 
 
@@ -70,26 +67,6 @@ def require_signal(runs: Sequence[Run]) -> None:
                 f"The shear stress of the run {run.name!r} is zero throughout: it says nothing of "
                 "the law. Leave the run out."
             )
-
-
-def left_by(
-    runs: Sequence[Run],
-    predicted: Sequence[Float[np.ndarray, " _"]],
-    expectation: Expectation | None = None,
-) -> LackOfFit:
-    """Return what predictions leave of runs, and whether that is noise, as `lack_of_fit` does."""
-    for run, values in zip(runs, predicted, strict=True):
-        if not np.all(np.isfinite(values)):
-            nan = float("nan")
-            reason = f"the law diverges in {run.name}, a run that it was learned from"
-            return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
-    return lack_of_fit(
-        [values - run.recorded for run, values in zip(runs, predicted, strict=True)],
-        [run.recorded for run in runs],
-        expectation,
-        [1.0 / run.sizes(run.recorded) for run in runs],
-        [sampling_interval(run.time, run.protocol, run.quantity) for run in runs],
-    )
 
 
 AFFORDABLE = 6000.0

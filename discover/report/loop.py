@@ -30,7 +30,7 @@ from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, s
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
 from discover.study.run_folder import RunFolder
-from discover.words import effect_title, listed, p_value, significant
+from discover.words import effect_title, listed, significant
 
 
 def write_loop(
@@ -283,7 +283,6 @@ _REMAINING = {
     "autocorrelation": "lag-1 correlation of the noise",
     "outliers": "outliers (excluded)",
     "outlier times s": "their times in s",
-    "probability": "p-value of the residual, if noise",
     "untested": "not tested for lack of",
     "without fluid": "no signal of the fluid",
     "worst run": "worst run",
@@ -306,8 +305,6 @@ def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
         for key, value in result.remaining.items()
         if key != "loading" and (value or key not in ("outliers", "without_fluid"))
     }
-    if (chance := content.get("probability")) is not None:
-        content["probability"] = p_value(chance)
     said = {"none", "None", "", "{}"}  # a row that says nothing is none
     return [(_REMAINING.get(k, k), value) for k, value in _flatten(content) if value not in said]
 

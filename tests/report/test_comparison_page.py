@@ -111,5 +111,5 @@ def test_a_notebook_is_told_the_verdict_first():
     comparison = made_up(sparse="unexplained")
     shown = comparison._repr_html_()
     assert shown.startswith(f"<p>{comparison.answer.headline}</p>")
-    assert "<p>unexplained by tensor_sindy: made up</p>" in shown
+    assert "<p>tensor_sindy: Describes the fitted runs to 1 %; the rest is systematic" in shown
     assert "Determined if the law is in the library: N1" in shown
