@@ -40,7 +40,7 @@ def up():
 
 @pytest.mark.slow
 def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
-    problem = training_problem([swing(2.0), up()], np.array([MODULUS]), np.array([TIME]))
+    problem = training_problem([swing(2.0), up()], Fluid(modulus=MODULUS, relaxation_time=TIME))
     mobility = jnp.zeros(8).at[3].set(MOBILITY)
     law = eqx.tree_at(lambda law: law.constants, without_network(True), mobility)
     along = told_as_differences(problem, law, 1e-6, 1e-5)

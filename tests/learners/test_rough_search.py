@@ -31,7 +31,7 @@ def records(noise=0.01, seed=0):
 
 
 def problem_of(runs, **limits):
-    return make_problem(runs, MODULUS, TIME, **limits)
+    return make_problem(runs, BASE, **limits)
 
 
 def test_where_the_fine_grid_follows_the_fastest_relaxation_so_does_the_rough_one():
@@ -48,7 +48,7 @@ def test_the_network_sees_every_state_of_a_sweep_in_fewer_steps(tmp_path):
     write_table(tmp_path / "amplitude_sweep.csv", columns)
     runs = list(dc.load_dataset(tmp_path).with_material_functions())
     known = known_part(BASE)
-    fine = of_network._problem(runs, known)
+    fine = of_network.make_problem(runs, known)
     rough, said = of_network._rougher(fine, runs, known, 100)
     assert np.array_equal(rough.records.recorded, fine.records.recorded)
     assert rough.flows.n_steps <= fine.flows.n_steps / 1.5

@@ -44,5 +44,5 @@ def test_a_record_that_is_zero_throughout_is_refused(learner):
 
 
 def test_weights_make_a_residual_the_relative_misfit():
-    records = make_problem(of_every_kind(20), np.ones(1), np.ones(1)).records
+    records = make_problem(of_every_kind(20), dc.Fluid()).records
     assert float(np.linalg.norm(records.residual(1.1 * records.recorded))) == pytest.approx(0.1)

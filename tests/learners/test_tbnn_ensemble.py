@@ -30,7 +30,7 @@ def first_normal_stresses(laws):
 @pytest.fixture(scope="module")
 def problem():
     data = synthetic_dataset("ptt_linear", {"epsilon": 0.4}, FLOWS, duration=8.0, n_samples=41)
-    return make_problem(data.runs, np.ones(1), np.ones(1))
+    return make_problem(data.runs, Fluid())
 
 
 @pytest.fixture(scope="module")

@@ -105,7 +105,7 @@ def test_a_wrong_setting_is_refused(data, options, message):
 @pytest.fixture(scope="module")
 def cloud(data):
     law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
-    return sample_states(law, make_problem(data.runs, np.ones(1), np.ones(1)))
+    return sample_states(law, make_problem(data.runs, Fluid()))
 
 
 def constant_law(constants):

@@ -9,7 +9,7 @@ from differences import told_as_differences
 from independent.homogeneous import GiesekusFluid
 
 from discover.dataset import Run
-from discover.laws import Giesekus
+from discover.laws import Fluid, Giesekus
 from discover.learners.tbnn_ude import TBNNUDE, least_squares, recipes
 from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
 from discover.learners.tbnn_ude.session import Session, initial_law, is_white
@@ -27,7 +27,7 @@ SMALL = DefaultRecipe(width=4, steps=6, polish_steps=40, max_tensors=1)
 
 def problem_of(law, parameters, **options):
     data = synthetic_dataset(law, parameters, FLOWS, duration=10.0, n_samples=51, **options)
-    return make_problem(data.runs, np.ones(1), np.ones(1))
+    return make_problem(data.runs, Fluid())
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +204,7 @@ def test_an_absurd_learning_rate_is_survived(giesekus_problem):
 @pytest.mark.slow
 def test_the_network_stands_on_a_known_base_law():
     data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
-    problem = make_problem(data.runs, np.ones(1), np.ones(1))
+    problem = make_problem(data.runs, Fluid())
     trained = recipes.train_default(problem, jax.random.key(0), True, SMALL, base_law=Giesekus(0.1))
     assert float(trained.law.constants[3]) == pytest.approx(0.2, abs=1e-4)  # the rest of 0.3
 
@@ -235,7 +235,7 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
         )
         for kind, rate in (("shear", 2.0), ("uniaxial", 0.8))
     ]
-    problem = make_problem(runs, np.ones(1), np.ones(1))
+    problem = make_problem(runs, Fluid())
     recorded = problem.records.recorded
     # the training grid errs by 4e-6 of the stress in shear; extension stretches faster
     assert float(jnp.max(jnp.abs(problem.predicted(Giesekus(0.3)) - recorded))) < 1e-4

@@ -5,7 +5,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -111,14 +110,14 @@ class TBNNUDE(RunPrediction):
     def _learn(self, runs: list[Run], known: Fluid, shorten: bool = True) -> None:
         started = time.perf_counter()
         recipe = self._recipe()
-        whole = held = problem = _problem(runs, known)
+        whole = held = problem = make_problem(runs, known)
         followed, fitted = runs, ""
         if isinstance(recipe, DefaultRecipe):
             if shorten and known.law.linear_relaxation:
                 followed, problem = shorter_where_it_pays(
                     runs,
                     whole,
-                    lambda shorter: _problem(shorter, known),
+                    lambda shorter: make_problem(shorter, known),
                     np.asarray(known.relaxation_time),
                     recipe.affordable,
                 )
@@ -227,12 +226,6 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[Run], known: Fluid, **limits: Any) -> TrainingProblem:
-    modes = np.asarray(known.modulus), np.asarray(known.relaxation_time)
-    viscosity = float(known.solvent_viscosity)
-    return make_problem(runs, *modes, solvent_viscosity=viscosity, base=known.law, **limits)
-
-
 _WORTH_TRAINING_ON = 1.5
 """Times fewer steps from which a rough grid pays; a law is tested on a grid of its own."""
 
@@ -244,11 +237,11 @@ def _rougher(
     fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
     said = []
     if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
-        problem = _problem(fewer, known)
+        problem = make_problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
     limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
     if limits is not None and known.law.linear_relaxation:
-        rough = _problem(fewer, known, **limits)
+        rough = make_problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
         if share >= _WORTH_TRAINING_ON:
             problem = rough
