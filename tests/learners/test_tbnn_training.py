@@ -40,9 +40,13 @@ def trained(giesekus_problem):
     return recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
 
 
+def of_random_weights(seed, width):
+    return initial_law(jax.random.key(seed), width, True, None, output=0.01)
+
+
 @pytest.mark.slow
 def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
-    law = recipes.make_network(jax.random.key(1), 3, True)
+    law = of_random_weights(1, 3)
     # truncation of order step², rounding of order 1e-16/step
     told_as_differences(giesekus_problem, law, 1e-5, 1e-7)
 
@@ -50,7 +54,7 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
-    law = recipes.make_network(jax.random.key(1), 3, True)
+    law = of_random_weights(1, 3)
     rebuild = Rebuild.everything(law)
     whole = giesekus_problem
 
@@ -156,7 +160,7 @@ def test_whiteness_tells_noise_from_structure(seed, kind):
 
 @pytest.mark.slow
 def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem):
-    law = recipes.make_network(jax.random.key(3), 5, True)
+    law = of_random_weights(3, 5)
     active = jnp.array([True, False, True])
     loss = float(recipes.paper_loss(law.network, law, giesekus_problem, active, 0.01))
     problem = giesekus_problem
@@ -239,6 +243,6 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
     recorded = problem.records.recorded
     # the training grid errs by 4e-6 of the stress in shear; extension stretches faster
     assert float(jnp.max(jnp.abs(problem.predicted(Giesekus(0.3)) - recorded))) < 1e-4
-    law = recipes.make_network(jax.random.key(1), 3, True)
+    law = of_random_weights(1, 3)
     along = told_as_differences(problem, law, 1e-5, 1e-6)
     np.testing.assert_allclose(along.recorded, problem.predicted(law), atol=1e-10)

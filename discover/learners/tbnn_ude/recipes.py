@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -153,18 +152,6 @@ class PaperRecipe:
     iterations_per_series: int = 900  # iterations for each series added; 8 × 900 = 7,200 in all
 
 
-def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> TensorBasisNetwork:
-    """Return the network at the start of training."""
-    law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
-    network: Any = law.network
-    last = network.layers[-1]  # its bias is there: the network is made with one
-    return eqx.tree_at(
-        lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
-        law,
-        (_INITIAL_OUTPUT * last.weight, jnp.zeros_like(last.bias)),
-    )
-
-
 def _with_series(problem: TrainingProblem, active: Bool[Array, " runs"]) -> TrainingProblem:
     """Return the problem with the other series at rest, where they cannot diverge."""
     quiet = problem.flows.faster(active.astype(float))
@@ -237,8 +224,7 @@ def train_paper(
     iteration, total and loss. `base_law`: known law to which the network is added.
     """
     recipe = recipe or PaperRecipe()
-    law = make_network(key, recipe.width, linear_relaxation)
-    law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
+    law = initial_law(key, recipe.width, linear_relaxation, None, base_law, _INITIAL_OUTPUT)
     network = law.network
     state = _adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))
     n_runs = len(problem.flows)
