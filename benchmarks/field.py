@@ -142,7 +142,7 @@ def tensor_sindy(records: Records, seed: int) -> Answer:
     import discover as dc
 
     library = dc.build_library(degree=1, closed_forms=("exp",))
-    model = dc.TensorSINDy(library=library, modulus=1.0, relaxation_time=1.0, random_state=seed)
+    model = dc.TensorSINDy(library=library, random_state=seed)
     model, predict = _ours(model, records)
     words = " + ".join(f"{term.coefficient:.3g} {term.term}" for term in model.terms_)
     return Answer(predict, NAMES.get(tuple(term.term for term in model.terms_)), words)
@@ -151,7 +151,7 @@ def tensor_sindy(records: Records, seed: int) -> Answer:
 def tensor_basis_network(records: Records, seed: int) -> Answer:
     import discover as dc
 
-    model = dc.TBNNUDE(modulus=1.0, relaxation_time=1.0, random_state=seed)
+    model = dc.TBNNUDE(random_state=seed)
     return Answer(_ours(model, records)[1], words="a network")
 
 

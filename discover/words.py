@@ -38,11 +38,6 @@ def percent_of(share: float) -> str:
     return f"{float(f'{100.0 * share:.{digits}g}'):.6g} %"
 
 
-def p_value(probability: float) -> str:
-    """Return a probability by chance to one digit, or that it is below 0.001."""
-    return "< 0.001" if probability < 1e-3 else f"{probability:.1g}"
-
-
 def nearest(given: object, known: Iterable[str]) -> str | None:
     """Return what is spelled most like a text; None where nothing is.
 

@@ -11,8 +11,8 @@ from discover.comparison.flows import QUANTITIES
 from discover.comparison.run_comparison import compare
 from discover.compilation_cache import enable_compilation_cache
 from discover.first_use import enable_x64
-from discover.report.plots.comparison.flows import curves, last_cycle
-from discover.report.plots.style import Picture, figure, legend_above, picture
+from discover.report.plots.comparison.flows import curves
+from discover.report.plots.style import Picture, figure, last_cycle, legend_above, picture
 from discover.study.data import read_study
 from discover.words import FIGURE_SYMBOLS
 
@@ -27,7 +27,7 @@ TITLES = {
 def draw(comparison: Comparison) -> Picture:
     """Return σ12, N1 and N2 against the shear rate in a flow that no fit saw."""
     flow = next(flow for flow in comparison.judged if flow.name == FLOW)
-    last = last_cycle(flow)
+    last = last_cycle(flow.times, flow.rate)
     with figure(1, 3, width=9.0, height=2.9) as (drawing, axes):
         for panel, quantity in zip(axes[0], QUANTITIES, strict=True):
             for label, style, stresses in curves(comparison, flow):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.flows import MEASURED, Flow, Stresses, columns_of
+from discover.comparison.flows import MEASURED, Band, Flow, Stresses, columns_of
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, make_batch
@@ -42,38 +42,6 @@ _POWERS = np.array([1.0, 2.0, 2.0])
 Hassager 1987, ch. 6], and so their relative errors."""
 
 _SEED = 20261128
-
-
-@dataclass(frozen=True)
-class Band:
-    """σ12 (or what is recorded), N1 and N2 of one flow with their 95 % bands, in Pa.
-
-    By quantity, shape (n,); not finite where no claim can be made.
-    """
-
-    middle: Mapping[str, Float[np.ndarray, " n"]]
-    low: Mapping[str, Float[np.ndarray, " n"]]
-    high: Mapping[str, Float[np.ndarray, " n"]]
-
-    def half_widths(self) -> dict[str, float]:
-        """Return the root-mean-square half-width of each over that of its middle, N2's of N1's."""
-        found = {}
-        for quantity in self.middle:
-            size = np.linalg.norm(self.middle["N1" if quantity == "N2" else quantity])
-            width = np.linalg.norm(self.high[quantity] - self.low[quantity])
-            found[quantity] = float(0.5 * width / size) if size > 0.0 else np.nan
-        return found
-
-    def claiming(self, quantities: Sequence[str]) -> "Band":
-        """Return the band with limits for some quantities alone."""
-
-        def of(limits: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-            return {
-                name: values if name in quantities else np.full_like(values, np.nan)
-                for name, values in limits.items()
-            }
-
-        return replace(self, low=of(self.low), high=of(self.high))
 
 
 @dataclass(frozen=True)

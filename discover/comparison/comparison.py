@@ -7,9 +7,8 @@ from typing import Any
 import pandas as pd
 
 from discover.answer import Answer, HasAnswer
-from discover.comparison.bands import Band
 from discover.comparison.classical import ClassicalFit
-from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
+from discover.comparison.flows import Band, Flow, Stresses, of_recorded, relative_errors
 from discover.comparison.hypotheses import terms_named
 from discover.comparison.outcome import LearnerOutcome, Placement, place
 from discover.comparison.rivals import Rival
@@ -17,10 +16,10 @@ from discover.comparison.statements import IN_LIBRARY, Statement, outcome_equati
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
+from discover.learners.lack_of_fit import FitVerdict, LackOfFit
 from discover.learners.results import estimates_of
 from discover.loop.loop_result import LoopResult
 from discover.plain_numbers import plain
-from discover.statistics import FitVerdict, LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView, table_of
 from tensor_library.law_terms import LawTerm
 
@@ -41,8 +40,8 @@ class Comparison(PageView, HasAnswer, SummaryView):
     `outcomes`: by learner. `posterior`: of the search among laws, effects and terms with the
     learners' proposals. `bands`: predictions of the posterior with their 95 % bands, by the key of
     the flow. `shares`: probability of each learner's law among all fitted, were one of them all
-    there is. `lack_of_fit`: of each learner's law to the training runs. `truth`: terms that a
-    perfect learner would find, or None. `noise`: relative noise of synthetic data, or None.
+    there is. `truth`: terms that a perfect learner would find, or None. `noise`: relative noise of
+    synthetic data, or None.
     `rivals`, `statements`: what the data do not determine. `structure`: what the training flows can
     determine of the library; None where not asked. `classical`: classical laws fitted to the same
     runs. `seed`: of the learners. `known`: known part as an equation; None where it cannot be
@@ -59,7 +58,6 @@ class Comparison(PageView, HasAnswer, SummaryView):
     posterior: LoopResult
     bands: Mapping[str, Band] = field(default_factory=dict, repr=False)
     shares: Mapping[str, float] = field(default_factory=dict)
-    lack_of_fit: Mapping[str, LackOfFit] = field(default_factory=dict)
     truth: Sequence[LawTerm] | None = None
     noise: float | None = None
     rivals: Sequence[Rival] = ()
@@ -85,8 +83,8 @@ class Comparison(PageView, HasAnswer, SummaryView):
             if one.probability > _POSSIBLE:
                 laws += map(terms_named, one.members)
         for name, outcome in self.outcomes.items():
-            left = self.lack_of_fit.get(name)
-            found += estimates_of(outcome.terms, left, laws, (name,), self._against(name))
+            against = self._against(name)
+            found += estimates_of(outcome.terms, outcome.left, laws, (name,), against)
         for one in self.answer.estimates:
             found.append(replace(one, key=("answer", *one.key)))
         return found
@@ -94,6 +92,11 @@ class Comparison(PageView, HasAnswer, SummaryView):
     def to_dataframe(self) -> pd.DataFrame:
         """Return `errors_table` with flow and quantity as columns."""
         return self.errors_table().reset_index()
+
+    @property
+    def lack_of_fit(self) -> dict[str, LackOfFit]:
+        """What each learner's law leaves of the runs that it learned from."""
+        return {name: one.left for name, one in self.outcomes.items() if one.left is not None}
 
     @property
     def verdict(self) -> FitVerdict:
@@ -207,7 +210,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
     def _shown(self) -> Iterable[Any]:
         yield from self.answer.lines
         for name, left in self.lack_of_fit.items():
-            yield f"{left.verdict.replace('_', ' ')} by {name}: {left.reason}"
+            yield f"{name}: {left.described}"
         for name, outcome in self.outcomes.items():
             yield f"{name}: {outcome.message}"
             if self.known is not None:
@@ -242,7 +245,9 @@ class Comparison(PageView, HasAnswer, SummaryView):
                 "terms": outcome.terms,
                 "errors": self._errors(name, self.judged),
                 "half_widths_of_members": {
-                    flow.name: outcome.half_widths(flow) for flow in self.judged
+                    flow.name: outcome.bands[flow.key].half_widths()
+                    for flow in self.judged
+                    if flow.key in outcome.bands
                 },
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "intervals_hold": IN_LIBRARY if holds else "no",

@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_simpson
 from discover import protocols
 from discover.dataset.material_functions import as_compared
 from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
-from discover.dataset.run import Run, sizes_of
+from discover.dataset.run import Run
 from discover.equations import law_terms
 from discover.errors import InputError
 from discover.forward.of_fluids import recorded_and_normal
@@ -105,11 +105,6 @@ class Flow:
         """What the record is drawn against: time in s, the rate in 1/s, frequency or amplitude."""
         return self.drawn[1]
 
-    def even(self, record: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return factors that give the noise of a record one size; ones but for curves, sweeps."""
-        size = sizes_of(record, self.protocol)
-        return np.min(size) / size
-
     @property
     def frequency(self) -> float | None:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
@@ -166,6 +161,39 @@ class Flow:
                 return f"{self.protocol.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
         return self.name
+
+
+@dataclass(frozen=True)
+class Band:
+    """σ12 (or what is recorded), N1 and N2 of one flow with their limits, in Pa.
+
+    Of a posterior its 95 % band, of an ensemble the lowest and highest member. By quantity, shape
+    (n,); not finite where no claim can be made.
+    """
+
+    middle: Mapping[str, Float[np.ndarray, " n"]]
+    low: Mapping[str, Float[np.ndarray, " n"]]
+    high: Mapping[str, Float[np.ndarray, " n"]]
+
+    def half_widths(self) -> dict[str, float]:
+        """Return the root-mean-square half-width of each over that of its middle, N2's of N1's."""
+        found = {}
+        for quantity in self.middle:
+            size = np.linalg.norm(self.middle["N1" if quantity == "N2" else quantity])
+            width = np.linalg.norm(self.high[quantity] - self.low[quantity])
+            found[quantity] = float(0.5 * width / size) if size > 0.0 else np.nan
+        return found
+
+    def claiming(self, quantities: Sequence[str]) -> "Band":
+        """Return the band with limits for some quantities alone."""
+
+        def of(limits: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            return {
+                name: values if name in quantities else np.full_like(values, np.nan)
+                for name, values in limits.items()
+            }
+
+        return replace(self, low=of(self.low), high=of(self.high))
 
 
 def comparison_flows(

@@ -199,7 +199,7 @@ def _training_runs(estimators: Mapping[str, RunPrediction], train: Any):
 def _common_base(estimators: Mapping[str, RunPrediction]) -> Fluid:
     import equinox as eqx
 
-    fluids = [known_part(one) for one in estimators.values()]
+    fluids = [known_part(one.base) for one in estimators.values()]
     for other in fluids[1:]:
         if not eqx.tree_equal(fluids[0], other, rtol=1e-12):
             raise InputError(

@@ -8,6 +8,7 @@ import numpy as np
 
 from discover.comparison.flows import (
     MEASURED,
+    Band,
     Flow,
     Stresses,
     columns_of,
@@ -54,13 +55,9 @@ class Frame:
         predictions, bands = dict(own.predictions), dict(own.bands)
         for flow in self.flows if self.added else ():
             predictions[flow.key] = self.recorded(flow, predictions[flow.key])
-            limits = bands.get(flow.key)
-            if limits is not None:
-                low, high = (self.recorded(flow, {q: v[i] for q, v in limits.items()})
-                             for i in (0, 1))  # fmt: skip
-                assert low is not None
-                assert high is not None
-                bands[flow.key] = {q: (low[q], high[q]) for q in limits}
+            if (band := bands.get(flow.key)) is not None:
+                ends = (self.recorded(flow, one) for one in (band.middle, band.low, band.high))
+                bands[flow.key] = Band(*ends)  # pyright: ignore[reportArgumentType]
         return replace(own, predictions=predictions, bands=bands)
 
     def alone(self) -> dict[str, Stresses | None]:

@@ -3,11 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome, physics_of, simulated
 from discover.dataset.run import Run
-from discover.laws import Fluid, UpperConvectedMaxwell
+from discover.laws import Fluid
+from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.progress import Progress, silent
@@ -27,34 +30,25 @@ def train(
     part.
     """
     options = study.compare
-    plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
-    shared = {
-        "modulus": model.modulus,
-        "relaxation_time": model.relaxation_time,
-        "known_relaxation": study.model.known_relaxation,
-        "base_law": None if plain_maxwell else model.law,
-        "solvent_viscosity": model.solvent_viscosity,
-    }
     library = study_library(study)
     if learner == "tensor_sindy":
         from discover.learners.tensor_sindy import TensorSINDy
 
         sparse = TensorSINDy(
+            base=replace(model.fluid, modulus_covariance=model.modulus_covariance),
             library=library,
             optimizer=options.optimizer,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
-            modulus_covariance=model.modulus_covariance,
-            **shared,
         ).fit(list(runs))
         return sparse.result_, sparse.fluid_
     if learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 
         estimator = TBNNUDE(
-            recipe=options.recipe, n_members=options.members, quick=options.quick,
-            projection_library=library, progress=progress, random_state=seed, **shared,
+            base=model.fluid, recipe=options.recipe, n_members=options.members, quick=options.quick,
+            projection_library=library, progress=progress, random_state=seed,
         )  # fmt: skip
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
@@ -114,9 +108,22 @@ class Learning:
             )
         predictions, seen = simulated(fluid, flows)
         outcome = LearnerOutcome.of(result, fluid, flows, predictions)
-        outcome = replace(outcome, physics=physics_of(seen, flows))
+        left = self._left(fluid, frame)
+        outcome = replace(outcome, physics=physics_of(seen, flows), left=left)
         if store is not None:
             store.save(learner, outcome.to_state())
             # the same route as after an interruption, so that both give the same files
             return LearnerOutcome.from_state(outcome.to_state())
         return outcome
+
+    def _left(self, fluid: Fluid, frame: Frame) -> LackOfFit | None:
+        """Return what a fluid leaves of the runs that have a signal, as the posterior asks it."""
+        study, runs = self.study, list(frame.data.fit.runs)
+        if study.compare.use_normal_stresses:
+            runs += [run.observing(quantity) for run in runs for quantity in run.beside]
+        runs = [run for run in runs if np.any(run.recorded)]
+        if not runs:
+            return None
+        fluid = replace(fluid, modulus_covariance=frame.model.modulus_covariance)
+        loading, computed = study.compare.loading or 0.0, study.data.synthetic is not None
+        return lack_of_fit(fluid, runs, study.loop.noise, loading, computed)

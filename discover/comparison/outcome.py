@@ -1,29 +1,19 @@
 """Outcome of one learner: its law, what it does in all flows, where they lie, what it leaves."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from discover import identify
-from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses, columns_of
-from discover.dataset.records.repeats import repeats_among
+from discover.comparison.flows import DRAWN, QUANTITIES, Band, Flow, Stresses, columns_of
 from discover.identify.physics_flows import time_scale
 from discover.laws import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.lack_of_fit import LackOfFit
 from discover.learners.results import TermTables
 from discover.plain_numbers import plain
-from discover.protocols.between_samples import sampling_interval
-from discover.statistics import LackOfFit, lack_of_fit
-from discover.statistics.residual import Expectation
-from discover.study.data import StudyData
-from discover.study.declared_model import StudyModel
-from discover.study.schema import Study
-
-Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
-"""Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +21,8 @@ class LearnerOutcome(TermTables):
     """Result of a learner with its predictions in every flow of the comparison.
 
     `predictions`: by the key of the flow; None where the law diverges. `physics`: from
-    `PhysicsReport.to_json`; None where not made. `bands`: by key, lowest and highest prediction
-    over the members of an ensemble; None where one diverges.
+    `PhysicsReport.to_json`; None where not made. `bands`: by key, of the members of an ensemble;
+    none where one diverges.
     """
 
     learner: str  # name of the learner
@@ -42,19 +32,8 @@ class LearnerOutcome(TermTables):
     message: str = ""  # one sentence on how the fit ended
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
-    bands: Mapping[str, Limits | None] = field(default_factory=dict)
-
-    def half_widths(self, flow: Flow) -> dict[str, float]:
-        """Return the rms half-width of each band over that of the prediction, N2's over N1's."""
-        limits, predicted = self.bands.get(flow.key), self.predictions.get(flow.key)
-        if limits is None or predicted is None:
-            return {}
-        found = {}
-        for quantity, (low, high) in limits.items():
-            size = np.linalg.norm(predicted["N1" if quantity == "N2" else quantity])
-            if size > 0:
-                found[quantity] = float(0.5 * np.linalg.norm(high - low) / size)
-        return found
+    bands: Mapping[str, Band] = field(default_factory=dict)
+    left: LackOfFit | None = None  # of the runs that it learned from
 
     @classmethod
     def of(
@@ -75,39 +54,37 @@ class LearnerOutcome(TermTables):
     def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
         """Return the outcome that was kept."""
 
-        def arrays(by_flow: Mapping[str, Mapping | None], of: Callable[[Any], Any]) -> dict:
-            return {
-                key: None if own is None else {name: of(one) for name, one in own.items()}
-                for key, own in by_flow.items()
-            }
-
-        def numbers(values: Any) -> np.ndarray:
-            return np.asarray(values, dtype=float)
+        def arrays(values: Mapping[str, Any] | None) -> dict[str, np.ndarray] | None:
+            return values and {name: np.asarray(one, dtype=float) for name, one in values.items()}
 
         read = {
             "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
-            "predictions": arrays(state["predictions"], numbers),
-            "bands": arrays(state.get("bands", {}), lambda ends: tuple(numbers(ends))),
+            "predictions": {key: arrays(own) for key, own in state["predictions"].items()},
+            "bands": {
+                key: Band(**{end: arrays(values) for end, values in own.items()})
+                for key, own in state["bands"].items()
+            },
+            # JSON has no number that is none
+            "left": (left := state.get("left"))
+            and LackOfFit(**{key: np.nan if one is None else one for key, one in left.items()}),
         }
         return cls(**{**state, **read})
 
 
 def _bands(
     result: LearnerResult, fluid: Fluid, flows: list[Flow], own: Mapping[str, Stresses | None]
-) -> dict[str, Limits | None]:
+) -> dict[str, Band]:
     if len(result.members) < 2:
         return {}
     others = [replace(fluid, law=law) for law in result.members if law is not result.law]
     members = [own, *(simulated(member, flows)[0] for member in others)]
-    bands: dict[str, Limits | None] = {}
+    bands = {}
     for flow in flows:
-        if flow.kind not in DRAWN:
-            continue
         told = [p for member in members if (p := member[flow.key]) is not None]
-        bands[flow.key] = None
-        if len(told) == len(members):
+        if flow.kind in DRAWN and len(told) == len(members):
             rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
-            bands[flow.key] = {q: (v.min(axis=0), v.max(axis=0)) for q, v in rows.items()}
+            low, high = ({q: end(v, axis=0) for q, v in rows.items()} for end in (np.min, np.max))
+            bands[flow.key] = Band(told[0], low, high)
     return bands
 
 
@@ -191,58 +168,6 @@ def _largest(values: np.ndarray) -> float:
 def _ratio(value: float, others: Sequence[float]) -> float:
     largest = max(others, default=0.0)
     return value / largest if largest > 0.0 else float("inf") if value > 0.0 else 0.0
-
-
-def expectation_of(study: Study, model: StudyModel, data: StudyData) -> Expectation:
-    """Return what a complete law may leave of the runs: noise, the sweep's own error, repeats."""
-    repeats, noise = repeats_among(list(data.dataset)), study.loop.noise
-    linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
-    told = 0.0 if repeats is None or noise is not None else repeats.error
-    return Expectation(noise, linear_error, told)
-
-
-def lacks_of_fit(
-    outcomes: Mapping[str, LearnerOutcome],
-    flows: Iterable[Flow],
-    expectation: Expectation,
-    normal_stresses_used: bool = False,
-) -> dict[str, LackOfFit]:
-    """Return what each learner's law leaves of the training runs, and whether that is noise.
-
-    `outcomes`: by learner. `flows`: the flows; only those of training are looked at. `expectation`:
-    what a complete law may leave. `normal_stresses_used`: whether measured normal stresses were
-    part of the fit.
-    """
-    training = [flow for flow in flows if flow.kind == "training"]
-    return {
-        name: _lack_of_fit(outcome, training, expectation, normal_stresses_used)
-        for name, outcome in outcomes.items()
-    }
-
-
-def _lack_of_fit(
-    outcome: LearnerOutcome,
-    training: Sequence[Flow],
-    expectation: Expectation,
-    normal_stresses_used: bool,
-) -> LackOfFit:
-    residuals, records, even, intervals = [], [], [], []
-    for flow in training:
-        prediction = outcome.predictions[flow.key]
-        for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
-            record = flow.reference.get(quantity) if quantity != "sigma12" else flow.measured
-            if record is None or not np.any(record):
-                continue
-            if prediction is None or not np.all(np.isfinite(prediction[quantity])):
-                nan = float("nan")
-                reason = f"the law diverges in {flow.name}, a run that it was learned from"
-                return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
-            record = np.asarray(record, dtype=float)
-            residuals.append(prediction[quantity] - record)
-            records.append(record)
-            even.append(flow.even(record))
-            intervals.append(sampling_interval(flow.times, flow.protocol, quantity))
-    return lack_of_fit(residuals, records, expectation, even, intervals)
 
 
 _PHYSICS_FLOWS = ("training", "held_out", "test")

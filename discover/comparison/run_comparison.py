@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from discover.comparison.bands import Band, flow_bands
+from discover.comparison.bands import flow_bands
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import (
     DRAWN,
+    Band,
     Flow,
     comparison_flows,
     prepared,
@@ -23,7 +24,6 @@ from discover.comparison.flows import (
 from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, study_library
-from discover.comparison.outcome import expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
@@ -78,7 +78,6 @@ def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
 
 
 _NO_LAW = "The data hold no signal, so no law was identified"
-_NO_FLUID = "noise and the instrument alone, without a fluid, are as likely"
 
 
 @in_one_thread
@@ -132,17 +131,14 @@ def compare(
     made_of, truth = study.data.synthetic, None
     if made_of is not None and declared.law_name == "ucm":
         truth = true_terms(made_of.law, made_of.parameters, study.model.known_relaxation)
-    left = lacks_of_fit(
-        outcomes, frame.flows, expectation_of(study, declared, data), options.use_normal_stresses
-    )
     if found.ended().verdict == "no_signal":
         outcomes = {
-            name: replace(one, terms=(), message=_NO_LAW, details={})
+            name: replace(
+                one, terms=(), message=_NO_LAW, details={},
+                left=one.left and replace(one.left, verdict="no_signal"),
+            )
             for name, one in outcomes.items()
-        }
-        left = {
-            name: replace(one, verdict="no_signal", reason=_NO_FLUID) for name, one in left.items()
-        }
+        }  # fmt: skip
     comparison = Comparison(
         name=study.name,
         data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
@@ -152,7 +148,6 @@ def compare(
         outcomes=outcomes,
         posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
-        lack_of_fit=left,
         truth=truth,
         noise=None if made_of is None else made_of.noise,
         seed=learning.seed,

@@ -10,8 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discover.comparison.bands import Band
-from discover.comparison.flows import MEASURED, QUANTITIES, Flow, relative_errors
+from discover.comparison.flows import MEASURED, QUANTITIES, Band, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import law_structure
 from discover.equations import Equation, Tested, combined

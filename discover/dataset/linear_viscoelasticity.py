@@ -12,7 +12,7 @@ from discover.dataset.mode_search import CLOSELY, ModeFit, ModeSearch, relative_
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.noise_model import independent_samples, rms
-from discover.statistics.noise.whiteness import FEWEST_FAST, noise_probability, separate_probability
+from discover.statistics.noise.whiteness import FEWEST_FAST, separate_probability
 
 MOST_MODES = 30
 # probability that noise leaves such a misfit, up to which it is taken to be none
@@ -222,6 +222,5 @@ def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
     """Return whether noise of each frequency may leave such a misfit; not told of a few."""
     if rows.shape[1] < FEWEST_FAST:
         return False
-    chance = len(rows) * min(separate_probability([row]) for row in rows)
-    of_all = noise_probability(rows)
-    return min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE
+    tested = [[row] for row in rows] + [list(rows)]
+    return len(tested) * min(map(separate_probability, tested)) > _SEEMS_NOISE

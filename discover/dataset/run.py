@@ -43,15 +43,6 @@ COLUMN_OF = {
 }  # fmt: skip
 
 
-def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[np.ndarray, " n"]:
-    """Units of a misfit, shape (n,): root mean square of a record; of states, the value itself."""
-    size = np.full(len(values), rms(values))
-    if protocol.control in STATES:
-        largest = float(np.max(np.abs(values), initial=0.0))
-        size = np.maximum(np.abs(values), _LEAST_STEADY * largest)
-    return np.where(size > 0, size, 1.0)
-
-
 @dataclass(frozen=True)
 class Run(NotebookView):
     """One experiment in shear or in extension.
@@ -209,8 +200,12 @@ class Run(NotebookView):
         return values
 
     def sizes(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return in units of what a misfit of each of these values is told, as `sizes_of` does."""
-        return sizes_of(values, self.protocol)
+        """Units of a misfit: root mean square of a record; of states, the value itself."""
+        size = np.full(len(values), rms(values))
+        if self.protocol.control in STATES:
+            largest = float(np.max(np.abs(values), initial=0.0))
+            size = np.maximum(np.abs(values), _LEAST_STEADY * largest)
+        return np.where(size > 0, size, 1.0)
 
     def observing(self, quantity: RecordedQuantity) -> "Run":
         """Return the same run with another quantity fitted or tested, under a name of its own.

@@ -8,29 +8,34 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from discover.answer import TOLERANCE
+from discover.answer import TOLERANCE, Discrepancy
 from discover.dataset import Dataset, Run
 from discover.dataset.run_table import temperature_of
 from discover.errors import InputError
-from discover.fitting.named_law_fit import Constant, NamedLawFit
+from discover.fitting.named_law_fit import NamedLawFit
 from discover.forward import AugmentedModel
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.fits import Fitter
+from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Search
 from discover.laws import LAWS, Fluid, make_law
 from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
-from discover.loop.path import records_of
-from discover.loop.runs import MOST_SAMPLES, RunRecord, require_samples, split_runs
+from discover.loop.from_posterior import Ended
+from discover.loop.loop import without_fluid
+from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
-from discover.protocols.between_samples import sampling_interval
-from discover.statistics import LackOfFit, lack_of_fit
-from discover.statistics.residual import Expectation
-from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model
+from discover.study.declared_model import (
+    MODE_CONSTANTS,
+    StudyModel,
+    forward_model,
+    linear_start,
+)
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Verdict
+from discover.summary_view import Estimate
 from discover.validation import validated
 from discover.words import did_you_mean, unknown_name
 
@@ -39,6 +44,8 @@ _STARTS = 8
 
 _DECADES = 1.5
 """To either side of the estimate, over which starts of a modulus or a time are spread."""
+
+_AT_END = 1e-6  # share of its range within which a constant lies at an end of it
 
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -132,29 +139,20 @@ def fit(
             f"{LAWS[law].title} cannot be integrated through these runs with any of {_STARTS} "
             "starts. Narrow the ranges with bounds, or give a start."
         )
-    records = records_of(search, best)
+    posterior = posterior_of(search)
+    ended = Ended(posterior, without_fluid(posterior), most=1)
     active = [known.name for known in forward.effects]
-    n, correlation = len(best.free), best.noise.correlation
+    left, n = ended.discrepancy, len(best.free)
     assert best.covariance is not None
-    independent = len(problem.fitted) * (1.0 - correlation) / (1.0 + correlation)
     return NamedLawFit(
         law, _constants(model, best, names, declared), best.covariance[:n, :n],
-        max(independent - n, 1.0), augmented_fluid(model, best.theta, active),
+        augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
-        _what_is_left(records, fitted, Expectation(noise, forward.linear_error)), tuple(records),
+        ended.verdict == "no_effect_needed", ended.noise,
+        None if left is None else Discrepancy(**left), tuple(ended.records),
         model, best.theta, declared_law(forward, best.theta, {}), data.name, tolerance,
         temperature_of(fitted),
     )  # fmt: skip
-
-
-def _what_is_left(
-    records: Sequence[RunRecord], fitted: Sequence[Run], expectation: Expectation
-) -> LackOfFit:
-    """Return whether what a fit leaves of the fitted runs is noise."""
-    left = [one.residual[0] for one in records if not one.held_out]
-    even = [1.0 / run.sizes(run.recorded) for run in fitted]
-    intervals = [sampling_interval(run.time, run.protocol, run.quantity) for run in fitted]
-    return lack_of_fit(left, [run.recorded for run in fitted], expectation, even, intervals)
 
 
 def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
@@ -202,7 +200,7 @@ def _declared(
             raise InputError(f"base must be a Fluid; got a {type(base).__name__}.")
         fluid = Fluid(built, base.modulus, base.relaxation_time, base.solvent_viscosity)
     elif one_mode:
-        estimate = dict(zip(MODE_CONSTANTS, _estimated_mode(runs), strict=True))
+        estimate = dict(zip(MODE_CONSTANTS, linear_start(runs), strict=True))
         fluid = Fluid(built, *((estimate | start | fixed)[name] for name in MODE_CONSTANTS))
     else:
         fluid = Fluid.from_sweep(data.linear_sweep, built)
@@ -216,19 +214,6 @@ def _declared(
         raise InputError("Modes come from base or the linear sweep; they cannot be fixed here.")
     free += [name for name in asked if name not in fixed]
     return with_known(declared_fluid(fluid, data), effects, free)
-
-
-def _estimated_mode(runs: Sequence[Run]) -> tuple[float, float]:
-    """Return a modulus in Pa and a time in s from the largest stresses, rates and durations.
-
-    The stress of a steady flow is about Gλγ̇, and a flow that shows relaxation lasts about λ or has
-    a rate of about 1/λ.
-    """
-    rates = [float(np.max(np.abs(run.rate))) for run in runs]
-    rate = float(np.median([r for r in rates if r > 0.0] or [1.0]))
-    time = 1.0 / rate
-    stress = float(np.median([np.max(np.abs(run.stress)) for run in runs])) or 1.0
-    return stress / (time * rate), time
 
 
 def _names_and_ranges(
@@ -310,28 +295,27 @@ def _starts(
 
 def _constants(
     model: AugmentedModel, fit: Fit, names: Mapping[int, str], declared: StudyModel
-) -> tuple[Constant, ...]:
+) -> tuple[Estimate, ...]:
     """Return the fitted constants in their units; of several modes the factor on them."""
     units = {
         f"{known.name}.{parameter.name}": parameter.unit or "1"
         for known in model.declared.effects
         for parameter in known.effect.parameters
     }
-    several = len(declared.modulus) > 1
-    assert fit.covariance is not None
     constants = []
-    for position, variance in zip(fit.free, np.diag(fit.covariance), strict=False):
-        name, value = names[position], float(fit.theta[position])
-        error = float(np.sqrt(max(variance, 0.0)))
-        ends = float(model.low[position]), float(model.high[position])
-        unit, logarithmic = units.get(name, "1"), fit.priors[position].is_logarithm
+    for position in fit.free:
+        name, low, high = names[position], float(model.low[position]), float(model.high[position])
+        value, *ends = float(fit.theta[position]), *fit.interval(position)
+        margin = _AT_END * (high - low if np.isfinite(high - low) else 1.0)
+        at_bound = min(value - low, high - value) <= margin
+        unit = units.get(name, "1")
         if position < 2:  # as the logarithm of a factor
-            size, logarithmic = _size(declared, position), True
+            size = _size(declared, position)
             value, *ends = (size * float(np.exp(one)) for one in (value, *ends))
-            if several:
+            if len(declared.modulus) > 1:
                 name = ("modulus_factor", "relaxation_time_factor")[position]
             else:
                 unit = ("Pa", "s")[position]
-        error *= value if logarithmic else 1.0
-        constants.append(Constant(name, unit, value, error, *ends, logarithmic=logarithmic))
+        notes = {"at_bound": bool(at_bound)}
+        constants.append(Estimate((name,), value, (ends[0], ends[1]), unit, notes=notes))
     return tuple(constants)

@@ -8,54 +8,26 @@ from typing import Any, ClassVar
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
-from scipy.stats import t as student
 
-from discover.answer import QUANTITIES, TOLERANCE, Answer, HasAnswer, Mode
-from discover.answer import Constant as Fitted
+from discover.answer import (
+    QUANTITIES,
+    TOLERANCE,
+    Answer,
+    Constant,
+    Discrepancy,
+    HasAnswer,
+    Mode,
+)
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS, Fluid
-from discover.loop.by_quantity import measured, of_fitted
+from discover.loop.by_quantity import measured
 from discover.loop.fitted_range import range_of
 from discover.loop.runs import RunRecord
-from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
-
-
-@dataclass(frozen=True)
-class Constant:
-    """Fitted constant, in `unit` as a study spells it; ``"1"`` if dimensionless.
-
-    The standard error of a modulus or time is that of its logarithm, times the value. `low`,
-    `high`: range of the fit. `logarithmic`: whether the logarithm was fitted.
-    """
-
-    name: str
-    unit: str
-    value: float
-    standard_error: float
-    low: float
-    high: float
-    logarithmic: bool = False
-
-    @property
-    def at_bound(self) -> bool:
-        """Whether it lies at an end of its range, which then determines it."""
-        margin = 1e-6 * (self.high - self.low if np.isfinite(self.high - self.low) else 1.0)
-        return self.value - self.low <= margin or self.high - self.value <= margin
-
-    def interval(self, quantile: float) -> tuple[float, float]:
-        """Return the ends of an interval of so many standard errors, inside the range."""
-        off = quantile * self.standard_error
-        if self.logarithmic:
-            ends = self.value * np.exp(np.array([-1.0, 1.0]) * off / self.value)
-        else:
-            ends = self.value + np.array([-off, off])
-        low, high = np.clip(ends, self.low, self.high)
-        return float(low), float(high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +40,14 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         Name of the law, as in `discover.laws`.
     constants, covariance
         What was fitted, and its covariance as fitted (moduli and times as logarithms), (p, p).
-    degrees_of_freedom
-        Independent samples of the residual less fitted constants.
     fluid
         The fitted fluid.
     effects
         Values of fitted and declared effects, by name.
-    misfit
-        Lack of fit to the runs.
+    fits_to_the_noise, noise
+        Whether what the fit leaves of the runs is noise, and relative noise, mean over the runs.
+    discrepancy
+        Size of what the fit leaves besides; None where nothing is said.
     records
         The runs, measured and predicted, those held out among them.
     model, theta
@@ -91,12 +63,13 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     """
 
     law: str
-    constants: tuple[Constant, ...]
+    constants: tuple[Estimate, ...]
     covariance: Float[np.ndarray, "p p"]
-    degrees_of_freedom: float
     fluid: Fluid
     effects: Mapping[str, tuple[float, ...]]
-    misfit: LackOfFit
+    fits_to_the_noise: bool
+    noise: float
+    discrepancy: Discrepancy | None
     records: tuple[RunRecord, ...]
     model: AugmentedModel
     theta: Float[np.ndarray, " all"]
@@ -118,24 +91,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         held = [one.errors[0] for one in self.records if one.held_out]
         return float(np.mean(held)) if held else None
 
-    @property
-    def fits_to_the_noise(self) -> bool:
-        """Whether what the fit leaves is noise."""
-        return self.misfit.verdict == "explained"
-
-    def _estimates(self) -> list[Estimate]:
-        return [
-            Estimate(
-                (one.name,), one.value, None, one.unit, one.standard_error,
-                {"at_bound": one.at_bound},
-            )
-            for one in self.constants
-        ]  # fmt: skip
-
-    def _interval(self, estimate: Estimate, level: float) -> tuple[float, float]:
-        # from the curvature at the fit and the noise of the residual, autocorrelation included
-        one = next(one for one in self.constants if (one.name,) == estimate.key)
-        return one.interval(float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)))
+    def _estimates(self) -> tuple[Estimate, ...]:
+        return self.constants
 
     @property
     def correlation(self) -> pd.DataFrame:
@@ -175,24 +132,18 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         """The law with its constants, how well it describes the runs, and where."""
         equation = self.written and self.equation()
         law = LAWS[self.law]
-        noise = self.misfit.noise
-        left = of_fitted(self.records, self.misfit.misfit, noise)
-        exact = self.fits_to_the_noise or not np.isfinite(left.size)
-        expected = {name: measured(self.records, name, noise) for name in QUANTITIES}
+        expected = {name: measured(self.records, name, self.noise) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
         answer = Answer(
             law.title,
             self.law,
-            tuple(
-                Fitted(one.name, one.value, (float(low), float(high)), one.unit)
-                for one, (low, high) in zip(self.constants, self.conf_int().to_numpy(), strict=True)
-            ),
+            tuple(Constant(one.key[0], one.value, one.ci95, one.unit) for one in self.constants),
             tuple(Mode(float(modulus), float(time)) for modulus, time in zip(*modes, strict=True)),
             float(self.fluid.solvent_viscosity),
             self.error,
-            noise,
+            self.noise,
             self.fits_to_the_noise,
-            None if exact else left,
+            None if self.fits_to_the_noise else self.discrepancy,
             range_of(self.records, equation),
             {name: one for name, one in expected.items() if one is not None},
             failed=self._caveats(),
@@ -208,7 +159,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         said = []
         if not self.fits_to_the_noise:
             said.append("The misfit is systematic; the intervals hold the noise only.")
-        bound = [one.name for one in self.constants if one.at_bound]
+        bound = [one.key[0] for one in self.constants if one.notes["at_bound"]]
         if bound:
             said.append(f"At an end of its range: {', '.join(bound)}.")
         return " ".join(said)
@@ -222,7 +173,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
             "answer_law": None if equation is None else equation_to_json(equation),
             "adequate_to_the_noise": self.fits_to_the_noise,
             "error": {"fit": self.error, "held_out": self.held_out_error},
-            "noise": self.misfit.noise,
+            "noise": self.noise,
             "effects": {name: list(values) for name, values in self.effects.items()},
             "correlation": self.correlation.to_dict(),
             "runs": self.to_dataframe().to_dict("records"),

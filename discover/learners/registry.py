@@ -108,5 +108,4 @@ def learn_with(name: str, task: LearningTask) -> tuple[LearnerResult, Fluid]:
     found = replace(
         found, learner=name, train_seconds=found.train_seconds or perf_counter() - start
     )
-    base = task.base
-    return found, Fluid(found.law, base.modulus, base.relaxation_time, base.solvent_viscosity)
+    return found, replace(task.base, law=found.law)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from discover.equations import Equation, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.statistics import LackOfFit
+from discover.learners.lack_of_fit import LackOfFit
 from discover.summary_view import Estimate, NotebookView
 from tensor_library.law_terms import Interval, LawTerm, spell
 

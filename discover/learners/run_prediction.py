@@ -12,21 +12,20 @@ from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
+from discover.dataset.records.thinning import without_spikes
 from discover.dataset.run import Run
 from discover.forward import make_batch
 from discover.forward.of_fluids import followed, observed, pieces_in_time
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
+from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
 from discover.learners.settings import (
-    ARITHMETIC,
     check_settings,
     known_part,
     require_known_rate,
 )
 from discover.linear_algebra_threads import in_one_thread
-from discover.protocols.between_samples import sampling_interval
-from discover.statistics import LackOfFit, lack_of_fit
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
 
@@ -47,6 +46,7 @@ _STRAIN_STEP = 0.2
 class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     """What is common to estimators: what they are fitted to, prediction, score, law, file."""
 
+    base: "Fluid | None"
     fluid_: "Fluid"
     result_: "LearnerResult"
     runs_: tuple[Run, ...]
@@ -67,16 +67,17 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
 
     @in_one_thread
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
-        """Find the law of runs `X`, or of a data set; `y` is ignored.
+        """Find the law of runs `X`, or of a data set, without outliers; `y` is ignored.
 
         Raises InputError if a parameter or a run is unusable.
         """
         del y
         check_settings(self.get_params(deep=False))
         self._check_parameters()
-        known = known_part(self)
+        known = known_part(self.base)
         # once, for it may be read only once
-        runs = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
+        whole = as_runs(X, known.relaxation_time, known.law.linear_relaxation)
+        runs = [without_spikes(run)[0] for run in whole]
         require_signal(runs)
         require_known_rate(known, runs)
         self._left = None
@@ -102,25 +103,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         """Lack of fit to the fitted runs; None of a file that does not say."""
         check_is_fitted(self, "fluid_")
         if getattr(self, "_left", None) is None and hasattr(self, "runs_"):
-            self._left = self._what_it_leaves(list(self.runs_))
+            errors = known_part(self.base).modulus_covariance
+            self._left = lack_of_fit(replace(self.fluid_, modulus_covariance=errors), self.runs_)
         return self._left
-
-    def _what_it_leaves(self, runs: list[Run]) -> LackOfFit:
-        predicted = self._predict_runs(runs)
-        for run, values in zip(runs, predicted, strict=True):
-            if not np.all(np.isfinite(values)):
-                nan = float("nan")
-                reason = f"the integration diverges in {run.name}"
-                return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
-        found = lack_of_fit(
-            [values - run.recorded for run, values in zip(runs, predicted, strict=True)],
-            [run.recorded for run in runs],
-            even=[1.0 / run.sizes(run.recorded) for run in runs],
-            intervals=[sampling_interval(run.time, run.protocol, run.quantity) for run in runs],
-        )
-        if found.verdict == "unexplained" and found.misfit <= ARITHMETIC:
-            return replace(found, verdict="explained", reason="the rest is arithmetic")
-        return found
 
     @property
     def text(self) -> str:

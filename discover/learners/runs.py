@@ -6,14 +6,13 @@ from typing import Any, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
 from discover.dataset.material_functions import as_compared
 from discover.dataset.run import Run, require_later_samples
 from discover.errors import InputError
 from discover.first_use import require_double
 from discover.forward.flow_batch import FlowBatch
-from discover.learners.settings import PerMode
 from discover.protocols import settled
 from discover.protocols.kinematics import STATES
 from discover.words import percent_of
@@ -21,7 +20,9 @@ from discover.words import percent_of
 _MAKE = "Load a folder with load_dataset, or make a data set of a table with from_dataframe."
 
 
-def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool = True) -> list[Run]:
+def as_runs(
+    runs: Iterable[Run], relaxation_time: ArrayLike = 0.0, relaxes: bool = True
+) -> list[Run]:
     """Return the runs as a list, each as `as_compared` has it.
 
     `relaxation_time`: of the modes, in s. `relaxes`: whether the fluid is known to relax, so that a

@@ -1,12 +1,8 @@
 """What estimators are given: settings, and the known part of the fluid; checked in `fit`."""
 
-import inspect
 from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
-
-import jax
-import numpy as np
 
 from discover.dataset.run import Run
 from discover.errors import InputError
@@ -15,9 +11,6 @@ from discover.laws.registry import check_law
 from discover.progress import checked
 from discover.protocols.kinematics import FOLLOWED
 from tensor_library.library import TermLibrary, build_library
-
-PerMode = float | int | Sequence[float] | np.ndarray | jax.Array
-"""A number, or one value for each relaxation mode, shape (k,)."""
 
 _WHOLE = {"max_terms": 1, "n_members": 1, "random_state": 0}
 """Settings that are whole numbers, with the least that each may be."""
@@ -54,42 +47,17 @@ def check_library(library: TermLibrary | None) -> None:
         )
 
 
-_HELD_BY_BASE = (
-    "modulus",
-    "relaxation_time",
-    "solvent_viscosity",
-    "base_law",
-    "known_relaxation",
-    "modulus_covariance",
-)
+def known_part(base: Any) -> Fluid:
+    """Return the known fluid to which an estimator adds terms: UCM of 1 Pa and 1 s where None is.
 
-
-def known_part(estimator: Any) -> Fluid:
-    """Return the known fluid to which an estimator adds terms: its `base`, or part by part.
-
-    Raises InputError if `base` is no fluid, something that it holds is given too, or a part is
-    unusable.
+    Raises InputError if `base` is no fluid, or its law cannot be computed.
     """
-    base = estimator.base
-    if base is None:
-        law = estimator.base_law
-        base = Fluid(
-            UpperConvectedMaxwell(estimator.known_relaxation) if law is None else law,
-            estimator.modulus,
-            estimator.relaxation_time,
-            estimator.solvent_viscosity,
-            getattr(estimator, "modulus_covariance", None),
-        )
-    elif not isinstance(base, Fluid):
+    base = Fluid() if base is None else base
+    if not isinstance(base, Fluid):
         raise InputError(
             f"base must be a Fluid; got a {type(base).__name__}. Make one with "
             "Fluid(law, modulus, relaxation_time) or Fluid.from_sweep(data.linear_sweep)."
         )
-    else:
-        defaults = inspect.signature(type(estimator).__init__).parameters
-        for name in _HELD_BY_BASE:
-            if name in defaults and not _same(getattr(estimator, name), defaults[name].default):
-                raise InputError(f"base holds {name} already; got both. Leave {name} out, or base.")
     check_law(base.law)
     return base
 
@@ -97,10 +65,6 @@ def known_part(estimator: Any) -> Fluid:
 def law_below(known: Fluid) -> AbstractConstitutiveLaw | None:
     """Return the law to whose h a learner adds; None where that is zero, so that programs serve."""
     return None if isinstance(known.law, UpperConvectedMaxwell) else known.law
-
-
-def _same(value: Any, default: Any) -> bool:
-    return value is default or (np.ndim(value) == 0 and bool(value == default))
 
 
 def require_known_rate(known: Fluid, runs: Sequence[Run]) -> None:

@@ -16,7 +16,6 @@ from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
-from discover.inference.engine.posterior import left_by_run
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
 from discover.loop import final_model
@@ -34,9 +33,8 @@ from discover.loop.parts import (
 )
 from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
-from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
-from discover.statistics.residual import fast_part
-from discover.words import p_value, percent_of
+from discover.statistics.residual import noise_beside
+from discover.words import percent_of
 
 _DRAWS = 2000
 _FREE = 3  # Degree of constants that are free in each mode
@@ -223,7 +221,6 @@ class Ended(Path):
         """Return what is left, as the contract names it."""
         problem, fit = self.posterior.problem, self.fit
         rows = problem.fitted
-        probability = noise_probability(*left_by_run(self.posterior.search.fitter, fit))
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs
@@ -238,7 +235,6 @@ class Ended(Path):
             "noise_floor": self.noise,
             "outliers": sum(map(len, spikes.values())),
             "outlier_times_s": spikes,
-            "probability": probability,
             "without_fluid": self.without_fluid,
             "untested": why_untested(self._constants, rows.runs, held),
             "linear_error": problem.declared.linear_error,
@@ -246,7 +242,7 @@ class Ended(Path):
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
             "bench": self._bench(),
-            "description": said + self._in_words(probability),
+            "description": said + self._in_words(),
             "step_instants": {}
             if not problem.declared.step_instants
             else instants_found(problem.model, self.theta_ahead(fit), instants, rows.runs, held),
@@ -272,19 +268,16 @@ class Ended(Path):
         sizes = self.fit.noise.sizes
         if self.verdict in ("unexplained", "no_signal"):
             left = [r.relative_residual[-1] for r in self.records if not r.held_out]
-            told = [len(values) >= FEWEST_FAST for values in left]
-            sizes = np.where(told, np.minimum([fast_part(values) for values in left], sizes), sizes)
+            sizes = noise_beside(left, sizes)
         return float(np.mean(sizes))
 
-    def _in_words(self, probability: float | None) -> str:
+    def _in_words(self) -> str:
         none = percent_of(self.posterior.unexplained)
         if self.without_fluid:
             return "Noise and instrument errors alone explain the data as well."
         text = f"Probability that an unknown effect is present: {none}."
         if self.verdict == "unexplained":
             text = f"An effect is still missing or has another form. {text}"
-        if probability is not None and probability < SIGNIFICANCE:
-            text += f" Probability of this residual, if noise: {p_value(probability)}."
         return text
 
     def _bench(self) -> dict[str, float]:

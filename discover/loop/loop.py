@@ -222,9 +222,7 @@ class Found:
     def ended(self, explanations: int = MOST_LISTED) -> Ended:
         """Return what is reported of the posterior, with so many explanations at most."""
         posterior = self._reported
-        return Ended(
-            posterior, without_fluid(posterior), self.task.order, explanations, self.curves
-        )
+        return Ended(posterior, without_fluid(posterior), explanations, self.curves)
 
     def result(self, explanations: int = MOST_LISTED) -> LoopResult:
         """Return the result of a closed loop."""

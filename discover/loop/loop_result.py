@@ -29,7 +29,6 @@ from discover.laws import Fluid
 from discover.loop import parts
 from discover.loop.answering import loop_answer
 from discover.loop.expected_errors import Spread
-from discover.loop.reading import Reading, read_residual
 from discover.loop.runs import RunRecord
 from discover.plain_numbers import json_text, plain
 from discover.summary_view import Estimate, PageView, SummaryView
@@ -187,11 +186,6 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
         differing = {n: self.by_mode[n].values for n in self.differing_by_mode}
         return law_parts_by_mode(fluid.law, differing, fluid.n_modes)
 
-    @cached_property
-    def readings(self) -> tuple[Reading, Reading]:
-        """On what the residuals of the declared and of the augmented model depend."""
-        return read_residual(self.records, 0), read_residual(self.records, -1)
-
     @property
     def held_in_band(self) -> float | None:
         """Share of held-out samples inside the band of all explanations; None without any."""
@@ -262,7 +256,6 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
             "noise_floor": self.noise_floor,
             "stages": self.stages,
             "remaining": self.remaining,
-            "residual": dict(zip(("declared", "augmented"), self.readings, strict=True)),
             "declared": self.declared,
             "declared_parameters": self.declared_parameters,
             "ranking": self.rankings,

@@ -57,13 +57,12 @@ class Path:
     """A posterior, the likeliest hypothesis of it, and the way there.
 
     `posterior`: what the runs say. `without_fluid`: whether a record without any fluid is as
-    likely. `order`: names of the runs of the data set, in its order. `most`: explanations that are
-    listed. `curves`: functions of one variable that are likelier than all that has a name.
+    likely. `most`: explanations that are listed. `curves`: functions of one variable that are
+    likelier than all that has a name.
     """
 
     posterior: Posterior
     without_fluid: bool
-    order: Sequence[str]
     most: int
     curves: Sequence[FreeForm] = ()
 
@@ -172,7 +171,7 @@ class Path:
                 continue
             stages = [self.predicted(fit, rows, held_out) for fit in self.path[1:]]
             models = np.stack([self.declared_predicted(rows), *stages])
-            records = record_runs(rows.runs, models, held_out, self.order)
+            records = record_runs(rows.runs, models, held_out)
             each = [self.predicted(fit, rows, held_out) for fit in fits]
             for i, record in enumerate(records):
                 n = len(record.time)

@@ -1,7 +1,7 @@
 """Runs of a closed loop: as it fits and judges by them, cut and thinned, and as it leaves them."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,7 +10,6 @@ from jaxtyping import Float
 from discover.dataset import Dataset, Run
 from discover.dataset.records.repeats import count_flows, require_no_copies
 from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
-from discover.dataset.run import TEMPERATURE
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.loop.measured_rates import with_rate_steps
@@ -163,13 +162,13 @@ class RunRecord:
     shape (n,); in extension the Hencky rate. `measured`: the quantity recorded, shape (n,): σ12 in
     shear, σ11 − σ22 in extension. `predicted`: recorded stress in Pa by the declared model and
     after each stage, shape (stages + 1, n). `errors`: relative error of each of these, shape
-    (stages + 1,). `conditions`: numbers that the source gives of the run, such as its temperature,
-    and its place in the order of the runs. `flow`: which flow it is. `quantity`: what is recorded:
-    ``sigma12``, ``tensile_stress``, ``N1``, ``N2``, ``storage_modulus`` or ``loss_modulus`` in Pa,
-    or ``strain``. `band`: where 95 % of the measurements should lie by all explanations together,
-    shape (2, n). `by_explanation`: what each explanation predicts, in the order of their
-    probability, shape (explanations, n). `control`: what was imposed. Where it is ``steady`` or
-    ``oscillation``, time only counts the samples; strain and rate of an oscillation are amplitudes.
+    (stages + 1,). `temperature_C`: of the measurement, in whole °C; None where unknown. `flow`:
+    which flow it is. `quantity`: what is recorded: ``sigma12``, ``tensile_stress``, ``N1``, ``N2``,
+    ``storage_modulus`` or ``loss_modulus`` in Pa, or ``strain``. `band`: where 95 % of the
+    measurements should lie by all explanations together, shape (2, n). `by_explanation`: what each
+    explanation predicts, in the order of their probability, shape (explanations, n). `control`:
+    what was imposed. Where it is ``steady`` or ``oscillation``, time only counts the samples;
+    strain and rate of an oscillation are amplitudes.
     """
 
     name: str
@@ -181,7 +180,7 @@ class RunRecord:
     measured: Float[np.ndarray, " n"]
     predicted: Float[np.ndarray, "stages n"]
     errors: Float[np.ndarray, " stages"]
-    conditions: dict[str, float] = field(default_factory=dict)
+    temperature_C: float | None = None
     flow: FlowKind = "shear"
     quantity: str = "sigma12"
     band: Float[np.ndarray, "2 n"] | None = None
@@ -193,13 +192,6 @@ class RunRecord:
     def fastest(self) -> float:
         """Largest rate, in 1/s."""
         return float(np.max(np.abs(self.rate)))
-
-    @property
-    def temperature_C(self) -> float | None:
-        """Temperature of the measurement, in whole °C; None where unknown."""
-        told = (self.conditions.get(key) for key in TEMPERATURE)
-        at = next((one for one in told if one is not None), None)
-        return None if at is None else float(round(at))
 
     @property
     def shift(self) -> float:
@@ -238,21 +230,14 @@ def record_runs(
     runs: Sequence[Run],
     predictions: Float[np.ndarray, "stages runs n"],
     held_out: bool,
-    order: Sequence[str] = (),
 ) -> list[RunRecord]:
-    """Return each run with the predictions of several models, which are padded.
-
-    `order`: names of the runs of the data set, in its order.
-    """
+    """Return each run with the predictions of several models, which are padded."""
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]
         size = rms(run.recorded)
         misfit = np.sqrt(np.mean((predicted - run.recorded) ** 2, axis=1))
-        conditions = {k: float(v) for k, v in run.metadata.items() if not isinstance(v, str)}
-        conditions.pop("n_points", None)  # of the file, not of the experiment
-        if run.name in order:
-            conditions["the order of the runs"] = float(list(order).index(run.name))
+        at = run.temperature_C
         records.append(
             RunRecord(
                 name=run.name,
@@ -264,7 +249,7 @@ def record_runs(
                 measured=run.recorded,
                 predicted=predicted,
                 errors=misfit / (size if size > 0 else 1.0),
-                conditions=conditions,
+                temperature_C=None if at is None else float(round(at)),
                 flow=run.flow,
                 quantity=run.quantity,
                 control=run.protocol.control,

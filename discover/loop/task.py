@@ -49,8 +49,8 @@ class Task:
     `noise`, `loading`: relative noise where it is known, and deviation of loadings, zero where
     there are none. `most`: largest number of effects. `say`: called with a line of text now and
     then. `computed`: whether runs were computed: they know no instrument, a sound one either.
-    `order`: names of the runs of the data set. `spikes`: times of samples set aside as outliers, by
-    run. `of_rates`: that rates were read with noise which the fluid did not feel; empty where not.
+    `spikes`: times of samples set aside as outliers, by run. `of_rates`: that rates were read with
+    noise which the fluid did not feel; empty where not.
     """
 
     declared: DeclaredModel
@@ -62,7 +62,6 @@ class Task:
     most: int = 3
     say: Say = lambda line: None
     computed: bool = False
-    order: Sequence[str] = ()
     spikes: Mapping[str, Sequence[float]] = field(default_factory=dict)
     of_rates: str = ""
 
@@ -97,7 +96,7 @@ class Task:
             fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
         return cls(
             declared, candidates, fitted, held, noise, loading or 0.0, max_effects,
-            progress or (lambda line: None), computed, dataset.names, spikes, of_rates,
+            progress or (lambda line: None), computed, spikes, of_rates,
         )  # fmt: skip
 
     def problem(

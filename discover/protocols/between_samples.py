@@ -239,18 +239,3 @@ def steps_between_samples(
         if straight:
             found.append(RateStep(float(time[i]), float(time[i + 1]), float(change[i])))
     return tuple(found)
-
-
-def sampling_interval(
-    time: Float[np.ndarray, " n"], protocol: FlowProtocol, quantity: str = "sigma12"
-) -> float:
-    """Return the median time between neighbouring samples of a record, in s.
-
-    NaN but for a shear stress at a given rate, from rest: the noise of a strain, a normal stress,
-    an extension, a table of states or cycles averaged need not be correlated in the same way.
-    """
-    plain = protocol.control == "rate" and float(protocol.begins) == 0.0
-    if not plain or {quantity, protocol.quantity} != {"sigma12"} or len(time) < 2:
-        return float("nan")
-    interval = float(np.median(np.diff(np.asarray(time, dtype=float))))
-    return interval if interval > 0.0 else float("nan")

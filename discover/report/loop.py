@@ -20,8 +20,6 @@ from discover.report.plots.loop.residual import (
     waterfall_picture,
 )
 from discover.report.plots.loop.runs import (
-    AS_DECLARED,
-    WITH_EFFECTS,
     free_form_picture,
     lissajous_picture,
     next_test_picture,
@@ -32,7 +30,7 @@ from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, s
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
 from discover.study.run_folder import RunFolder
-from discover.words import effect_title, listed, p_value, significant
+from discover.words import effect_title, listed, significant
 
 
 def write_loop(
@@ -80,11 +78,6 @@ def write_loop(
         kinds=KINDS,
         remaining=remaining_rows(result),
         small_faults=SMALL_FAULTS,
-        readings=[
-            (f"{name[:1].upper()}{name[1:]}", reading.sentences)
-            for name, reading in zip((AS_DECLARED, WITH_EFFECTS), result.readings, strict=True)
-            if name == AS_DECLARED or result.stages
-        ],
         pictures=drawn,
         run=run
         or made_by(
@@ -290,7 +283,6 @@ _REMAINING = {
     "autocorrelation": "lag-1 correlation of the noise",
     "outliers": "outliers (excluded)",
     "outlier times s": "their times in s",
-    "probability": "p-value of the residual, if noise",
     "untested": "not tested for lack of",
     "without fluid": "no signal of the fluid",
     "worst run": "worst run",
@@ -313,8 +305,6 @@ def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
         for key, value in result.remaining.items()
         if key != "loading" and (value or key not in ("outliers", "without_fluid"))
     }
-    if (chance := content.get("probability")) is not None:
-        content["probability"] = p_value(chance)
     said = {"none", "None", "", "{}"}  # a row that says nothing is none
     return [(_REMAINING.get(k, k), value) for k, value in _flatten(content) if value not in said]
 

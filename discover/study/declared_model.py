@@ -115,7 +115,7 @@ def declared_model(study: Study, dataset: Dataset) -> StudyModel:
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
         solvent, solid = spectrum.solvent_viscosity, spectrum.solid
     else:
-        given, start = (model.modulus_Pa, model.relaxation_time_s), _linear_start(dataset)
+        given, start = (model.modulus_Pa, model.relaxation_time_s), linear_start(dataset.runs)
         modulus, relaxation_time = (
             np.atleast_1d(np.asarray(first if value == "fit" else value, dtype=float))
             for value, first in zip(given, start, strict=True)
@@ -278,7 +278,7 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
     return LinearSweep(omega[keep], sweep.storage_modulus[keep], sweep.loss_modulus[keep])
 
 
-def _linear_start(dataset: Dataset) -> tuple[float, float]:
+def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
     """Return a modulus in Pa and a relaxation time in s of the right order from the runs.
 
     The time is a tenth of the median duration, or the inverse of a flow curve's middle rate or a
@@ -292,13 +292,13 @@ def _linear_start(dataset: Dataset) -> tuple[float, float]:
             return 1.0 / max(float(np.median(np.abs(run.rate))), SLOWEST_RATE)
         return 0.1 * float(run.time[-1])
 
-    time = float(np.median([slowest(run) for run in dataset]))
-    stressed = [(run, np.max(np.abs(run.stress))) for run in dataset if np.any(run.stress)]
+    time = float(np.median([slowest(run) for run in runs]))
+    stressed = [(run, np.max(np.abs(run.stress))) for run in runs if np.any(run.stress)]
     rates = [(stress, np.max(np.abs(run.rate))) for run, stress in stressed]
     viscosities = [stress / rate for stress, rate in rates if rate > SLOWEST_RATE]
     moduli = [
         float(np.max(np.abs(run.stress)) / np.max(np.abs(run.strain)))
-        for run in dataset
+        for run in runs
         if run.strain is not None and np.any(run.strain)
     ]
     if viscosities or not moduli:

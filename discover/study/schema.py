@@ -99,7 +99,7 @@ class Compare(Section):
     quick: bool = False
     """Fewer training steps, for a first look."""
     members: Annotated[int, Field(ge=1, le=64)] = 3
-    """Networks that are trained."""
+    """Networks of the ensemble."""
     most_samples: Annotated[int, Field(ge=10, le=20_000)] = 1000
     """Most samples of a run that are used."""
     seed: Seed = 0

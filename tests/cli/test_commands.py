@@ -80,7 +80,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
     study.write_text(STUDY)
     first = invoke("compare", study, "--out", out)
     assert first.exit_code == 0, first.output
-    for name in ("report.html", "comparison.json", "equations.tex", "figures/loss.svg"):
+    for name in ("report.html", "comparison.json", "equations.tex"):
         assert (out / name).is_file()
     assert str(out / "report.html") in first.output.replace("\n", "")
     again = invoke("compare", study, "--out", out)

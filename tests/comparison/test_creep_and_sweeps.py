@@ -101,9 +101,7 @@ def few_samples():
 
 @pytest.mark.slow
 def test_the_network_is_told_of_creep_and_moduli_as_their_differences_say():
-    problem = make_training_problem(
-        few_samples(), np.array(MODULUS), np.array(TIME), solvent_viscosity=SOLVENT
-    )
+    problem = make_training_problem(few_samples(), BASE)
     along = told_as_differences(problem, nearly_giesekus(0.3), 1e-6, 2e-5)
     # what it misses is its own departure from the law that made them, and the noise
     missed = np.abs(along.recorded - problem.records.recorded)[0]

@@ -12,7 +12,6 @@ from discover.dataset.records.repeats import (
     count_flows,
     is_copy,
     repeated_tests,
-    repeats_among,
     require_no_copies,
 )
 from discover.errors import InputError
@@ -29,19 +28,10 @@ def record(name, rate=2.0, factor=1.0, noise=0.0, seed=0, times=TIMES, **metadat
     return dc.Run(name, times, dc.start_up(rate), rates, exact + off, metadata=metadata)
 
 
-def test_loadings_that_differ_by_a_factor_are_told_with_its_size():
-    found = repeats_among([record("a", factor=1.03), record("b", factor=0.97), record("c", 5.0)])
-    assert found is not None
-    assert found.groups == (("a", "b"),)
-    assert found.error == pytest.approx(0.06 / np.sqrt(2.0), rel=1e-3)
-
-
-def test_noise_alone_comes_out_with_its_size_also_at_other_times():
-    runs = [record(str(seed), noise=0.02, seed=seed) for seed in range(6)]
-    assert repeats_among(runs).error == pytest.approx(0.02, rel=0.15)
-    # a record between whose samples the other is read: exact curves differ by next to nothing
-    shifted = [record("a"), record("b", times=TIMES[:-1] + 0.05)]
-    assert repeats_among(shifted).error < 2e-3
+def test_a_repeated_test_is_told_whatever_its_loading_noise_and_times():
+    other = record("b", factor=0.97, noise=0.02, times=TIMES[:-1] + 0.05)
+    runs = [record("a", factor=1.03), other, record("c", 5.0)]
+    assert repeated_tests(runs) == (("a", "b"),)
 
 
 @pytest.mark.parametrize(
@@ -52,14 +42,14 @@ def test_noise_alone_comes_out_with_its_size_also_at_other_times():
 def test_another_test_is_no_repeat(other):
     first = record("a", temperature_C=160.0)
     second = record("b", **{"temperature_C": 160.0, **other})
-    assert repeats_among([first, second]) is None
+    assert repeated_tests([first, second]) == ()
 
 
 def test_another_history_is_no_repeat_and_a_count_of_the_source_is_no_condition():
     first = record("a", n_points=60.0)
-    assert repeats_among([first, record("b", n_points=400.0)]) is not None
-    assert repeats_among([first, replace(record("b"), strain_before=10.0)]) is None
-    assert repeats_among([]) is None
+    assert repeated_tests([first, record("b", n_points=400.0)]) == (("a", "b"),)
+    assert repeated_tests([first, replace(record("b"), strain_before=10.0)]) == ()
+    assert repeated_tests([]) == ()
 
 
 def waving(name, times):
@@ -75,23 +65,9 @@ def test_runs_that_only_begin_alike_are_no_repeat():
     assert count_flows([short, waving("wave", TIMES)]) == 2
 
 
-def test_what_differs_by_more_than_loadings_do_excuses_nothing():
-    # in minutes, and longer: the same rate, and another time
-    minutes = replace(record("a", times=60.0 * TIMES), time=TIMES)
-    runs = [record("b"), minutes]
-    assert repeats_among(runs) is None
-    # it stays one flow, and other repeats tell their error
-    assert count_flows(runs) == 1
-    found = repeats_among([*runs, record("c", factor=1.03)])
-    assert found is not None
-    assert found.groups == (("b", "c"),)
-    assert found.error == pytest.approx(0.03 / np.sqrt(2.0), rel=0.03)
-
-
-def test_a_run_that_ends_early_is_the_same_flow_and_tells_little():
+def test_a_run_that_ends_early_is_the_same_flow():
     early = record("b", factor=1.03, times=np.linspace(0.05, 1.0, 20))
     assert repeated_tests([record("a"), early]) == (("a", "b"),)
-    assert repeats_among([record("a"), early]) is None
 
 
 COPIED = np.linspace(0.1, 8.0, 80)

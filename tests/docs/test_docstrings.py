@@ -65,7 +65,7 @@ def without_shape_or_unit(public) -> list[str]:
     said = described(inspect.getdoc(public) or "")
     arrays = [
         name for name, parameter in inspect.signature(public).parameters.items()
-        if re.search(r"\bFloat\[|\bPerMode\b", str(parameter.annotation)) and name in said
+        if re.search(r"\bFloat\[", str(parameter.annotation)) and name in said
     ]  # fmt: skip
     return [n for n in arrays if not (UNITS.search(said[n]) and SHAPES.search(said[n]))]
 

@@ -70,24 +70,15 @@ def eqx_array(leaf):
     return isinstance(leaf, jax.Array)
 
 
-def test_a_base_is_modulus_time_and_law_at_once(data, base, sindy):
+def test_a_base_is_modulus_time_and_law_at_once(sindy):
     (term,) = sindy.terms_
     assert term.term == "sigma.sigma"
     assert term.coefficient == pytest.approx(MOBILITY, abs=0.03)  # planted by scipy
-    parts = dc.TensorSINDy(
-        library=LIBRARY, max_terms=1, modulus=np.asarray(base.modulus),
-        relaxation_time=np.asarray(base.relaxation_time),
-    ).fit(data.split(["fast.csv"])[0])  # fmt: skip
-    assert parts.terms_[0].coefficient == term.coefficient
 
 
 @pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize("learner", [dc.TensorSINDy, dc.TBNNUDE])
-def test_a_base_and_its_parts_are_not_both_given(data, base, learner):
-    for name, value in (("modulus", 2.0), ("relaxation_time", [1.0, 2.0]),
-                        ("known_relaxation", False)):  # fmt: skip
-        with pytest.raises(dc.InputError, match=f"base holds {name} already"):
-            learner(base=base, **{name: value}).fit(data)
+def test_a_base_is_a_fluid(data, learner):
     with pytest.raises(dc.InputError, match=r"must be a Fluid.*Fluid\(law"):
         learner().set_params(base=dc.make_law("ucm")).fit(data)
 

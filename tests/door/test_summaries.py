@@ -6,9 +6,9 @@ import pytest
 from scipy.stats import norm
 
 import discover as dc
+from discover.learners.lack_of_fit import LackOfFit
 from discover.learners.results import RecoveredTerm, estimates_of
 from discover.learners.settings import default_library
-from discover.statistics import LackOfFit
 from discover.study import parse_study
 from discover.summary_view import Estimate, SummaryView
 
@@ -120,7 +120,7 @@ def test_a_result_without_constants_has_an_empty_table():
     ],
 )
 def test_a_term_is_determined_if_nothing_speaks_against_it(verdict, ends, rivals, said):
-    left = LackOfFit(verdict, 0.01, 0.01, 0.0, 0.5)
+    left = LackOfFit(verdict, 0.01, 0.01, 0.0, 0.9)
     (one,) = estimates_of((RecoveredTerm("sigma.sigma", 0.2, ci95=ends),), left, rivals)
     assert one.notes["determined"].startswith(said)
 

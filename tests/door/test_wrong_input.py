@@ -106,10 +106,7 @@ def test_a_mistake_is_one_error_that_says_what_was_wanted(call, message):
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_settings_of_the_wrong_kind_are_refused_before_anything_is_fitted(learner):
     for settings, message in (
-        ({"modulus": "1"}, "modes of a fluid, in Pa and s, must be numbers"),
-        ({"relaxation_time": [1.0, 2.0]}, "one value for each mode"),
-        ({"solvent_viscosity": -1.0}, "not negative"),
-        ({"base_law": "ucm"}, "must be a law"),
+        ({"base": "ucm"}, "base must be a Fluid"),
         ({"random_state": -1}, "whole number, at least 0"),
         ({"random_state": 1.5}, "whole number, at least 0"),
         ({"progress": "loud"}, "progress must be a function"),

@@ -144,7 +144,7 @@ def test_constants_of_such_a_law_are_fitted(registered):
     assert low < 0.3 < high
     # negative control: the law's function decides what is fitted
     other = dc.fit("ptt_linear", data, base=base)
-    assert other.misfit.misfit > 2.0 * fitted.misfit.misfit
+    assert other.error > 2.0 * fitted.error
 
 
 @pytest.mark.parametrize(

@@ -177,7 +177,7 @@ def test_a_fit_has_the_answer_of_the_other_commands(fitted):
     assert use["range"]["rate_1_s"] == [0.5, 3.0]
     # twice as fast as any that was fitted; 1 % of noise is in its error, and is subtracted
     beyond = use["expected_error_beyond"]["sigma12"]
-    assert beyond**2 + fitted.misfit.noise**2 == pytest.approx(fitted.held_out_error**2)
+    assert beyond**2 + fitted.noise**2 == pytest.approx(fitted.held_out_error**2)
     assert use["expected_error"]["N2"] is None
     assert fitted.adequate
     assert fitted.answer.headline.startswith("Giesekus, α = 0.3")

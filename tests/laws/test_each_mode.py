@@ -154,7 +154,7 @@ def test_learners_start_from_the_law_of_each_mode():
     # control: without the difference of modes a term stands for it
     mean = Fluid(make_law("giesekus", {"alpha": 0.5 * sum(MOBILITIES)}), MODULI, TIMES)
     assert sparse.set_params(base=mean).fit([run]).terms_
-    network = make_training_problem([run], np.array(MODULI), np.array(TIMES), base=giesekus())
+    network = make_training_problem([run], base)
     law = initial_law(jax.random.key(0), 4, True, jnp.ones(8), giesekus())
     recorded = np.asarray(trajectories(law, network).recorded)[0, : len(SAMPLES)]
     assert recorded == pytest.approx(run.stress, rel=1e-4)

@@ -33,7 +33,7 @@ def start(rate=2.0):
 
 @pytest.mark.slow
 def test_the_network_is_told_of_steady_states_as_their_differences_say():
-    problem = make_training_problem([flow_curve(rates=SLOW), start()], np.ones(1), np.ones(1))
+    problem = make_training_problem([flow_curve(rates=SLOW), start()], dc.Fluid())
     along = told_as_differences(problem, nearly_giesekus(MOBILITY), 1e-5, 1e-6)
     assert np.all(np.isfinite(along.states))
 

@@ -8,6 +8,7 @@ from differences import told_as_differences
 from independent import Giesekus, oscillation
 
 from discover.dataset import Run
+from discover.laws import Fluid
 from discover.learners.runs import as_runs
 from discover.learners.tbnn_ude.problem import make_problem as training_problem
 from discover.learners.tbnn_ude.session import without_network
@@ -39,7 +40,7 @@ def up():
 
 @pytest.mark.slow
 def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
-    problem = training_problem([swing(2.0), up()], np.array([MODULUS]), np.array([TIME]))
+    problem = training_problem([swing(2.0), up()], Fluid(modulus=MODULUS, relaxation_time=TIME))
     mobility = jnp.zeros(8).at[3].set(MOBILITY)
     law = eqx.tree_at(lambda law: law.constants, without_network(True), mobility)
     along = told_as_differences(problem, law, 1e-6, 1e-5)
@@ -56,7 +57,7 @@ def test_only_what_does_not_relax_by_itself_waits():
 @pytest.mark.slow
 def test_a_slow_mode_is_learned_from_two_cycles():
     runs = [swing(strain, noise=0.01) for strain in (0.5, 2.0)]
-    fitted = TensorSINDy(LIBRARY, modulus=MODULUS, relaxation_time=TIME).fit(runs)
+    fitted = TensorSINDy(LIBRARY, base=Fluid(modulus=MODULUS, relaxation_time=TIME)).fit(runs)
     (term,) = fitted.result_.terms
     assert term.term == "sigma.sigma"
     low, high = term.ci95

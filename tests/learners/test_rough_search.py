@@ -13,9 +13,8 @@ def test_the_network_sees_every_state_of_a_sweep_in_fewer_steps(tmp_path):
     columns = {"strain": strains, "omega_rad_s": np.ones(24), "Gp_Pa": strains, "Gpp_Pa": strains}
     write_table(tmp_path / "amplitude_sweep.csv", columns)
     runs = list(dc.load_dataset(tmp_path).with_material_functions())
-    base = dc.Fluid(dc.make_law("ucm"), [300.0, 200.0], [2.0, 0.1])
-    known = known_part(dc.TBNNUDE(base=base))
-    fine = of_network._problem(runs, known)
+    known = known_part(dc.Fluid(dc.make_law("ucm"), [300.0, 200.0], [2.0, 0.1]))
+    fine = of_network.make_problem(runs, known)
     rough, said = of_network._rougher(fine, runs, known, 100)
     assert np.array_equal(rough.records.recorded, fine.records.recorded)
     assert rough.flows.n_steps <= fine.flows.n_steps / 1.5

@@ -68,7 +68,8 @@ def test_units_come_in_through_modulus_and_relaxation_time(data):
         )
         for run, (wi, de) in zip(data.runs, [(1, 0.5), (2, 0.5), (2, 1.0)], strict=True)
     ]
-    model = TBNNUDE(recipe=SMALL, modulus=50.0, relaxation_time=4.0, n_members=1).fit(slow)
+    known = Fluid(modulus=50.0, relaxation_time=4.0)
+    model = TBNNUDE(recipe=SMALL, base=known, n_members=1).fit(slow)
     assert float(model.law_.constants[3]) == pytest.approx(0.3, abs=1e-4)
     assert model.score(slow) > 0.9999
 
@@ -81,15 +82,15 @@ def test_modes_of_a_spectrum_share_the_law_that_their_sum_teaches():
         Run(name, times, flow, np.zeros(51), simulate(fluid, flow, times).shear_stress)
         for name, flow in FLOWS.items()
     ]
-    settings = {"modulus": [70.0, 30.0], "relaxation_time": [1.0, 0.2], "n_members": 1}
-    model = TBNNUDE(recipe=SMALL, **settings).fit(runs)
+    known = Fluid(modulus=[70.0, 30.0], relaxation_time=[1.0, 0.2])
+    model = TBNNUDE(recipe=SMALL, base=known, n_members=1).fit(runs)
     # integration on the training grid errs by 4e-6 of the stress
     np.testing.assert_allclose(model.law_.constants, [0, 0, 0, 0.3, 0, 0, 0, 0], atol=1e-4)
     np.testing.assert_array_equal(model.fluid_.modulus, [70.0, 30.0])
     # negative control: all of the modulus in the slow mode is another fluid
     assert model.score(runs) > 0.9999
     model.fluid_ = Fluid(model.law_, 100.0, 1.0)
-    assert model.set_params(modulus=100.0, relaxation_time=1.0).score(runs) < 0.99
+    assert model.set_params(base=Fluid(modulus=100.0)).score(runs) < 0.99
 
 
 @pytest.mark.parametrize(
@@ -104,7 +105,7 @@ def test_a_wrong_setting_is_refused(data, options, message):
 @pytest.fixture(scope="module")
 def cloud(data):
     law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
-    return sample_states(law, make_problem(data.runs, np.ones(1), np.ones(1)))
+    return sample_states(law, make_problem(data.runs, Fluid()))
 
 
 def constant_law(constants):
@@ -146,7 +147,8 @@ def test_projection_of_nothing_is_nothing(cloud):
 
 def test_a_solvent_beside_the_modes_leaves_the_same_law(data, model):
     viscous = [replace(run, stress=run.stress + 0.4 * run.rate) for run in data.runs]
-    with_solvent = TBNNUDE(recipe=SMALL, n_members=1, solvent_viscosity=0.4).fit(viscous)
+    known = Fluid(solvent_viscosity=0.4)
+    with_solvent = TBNNUDE(recipe=SMALL, n_members=1, base=known).fit(viscous)
     (term,) = with_solvent.terms_
     # runs weigh by records that hold the solvent's part: what the prior bends differs a little
     assert term.coefficient == pytest.approx(model.terms_[0].coefficient, abs=1e-4)

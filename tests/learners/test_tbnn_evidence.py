@@ -43,7 +43,7 @@ def problem(fluid):
         rates = amplitude * np.cos(frequency * TIMES)
         flow = dc.oscillatory_shear(amplitude, frequency)
         runs.append(dc.Run(f"{amplitude}_{frequency}", TIMES, flow, rates, record))
-    return make_problem(runs, np.ones(1), np.ones(1))
+    return make_problem(runs, Fluid())
 
 
 @pytest.fixture(scope="module")

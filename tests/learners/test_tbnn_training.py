@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from differences import told_as_differences
 from independent.homogeneous import GiesekusFluid
-from scipy.optimize import least_squares as by_scipy
 
 from discover.dataset import Run
-from discover.laws import Giesekus
+from discover.laws import Fluid, Giesekus
 from discover.learners.tbnn_ude import TBNNUDE, recipes
-from discover.learners.tbnn_ude.least_squares import Linearised, Steps
 from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
+from discover.learners.tbnn_ude.session import initial_law
 from discover.protocols import in_flow, oscillatory_shear, start_up
 from discover.simulate import synthetic_dataset
 
@@ -27,7 +26,7 @@ SMALL = DefaultRecipe(width=4, steps=6, polish_steps=40, max_tensors=1)
 
 def problem_of(law, parameters, **options):
     data = synthetic_dataset(law, parameters, FLOWS, duration=10.0, n_samples=51, **options)
-    return make_problem(data.runs, np.ones(1), np.ones(1))
+    return make_problem(data.runs, Fluid())
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +37,10 @@ def giesekus_problem():
 @pytest.fixture(scope="module")
 def trained(giesekus_problem):
     return recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
+
+
+def of_random_weights(seed, width):
+    return initial_law(jax.random.key(seed), width, True, None, output=0.01)
 
 
 def test_constants_alone_recover_the_mobility_from_shear_stress(trained):
@@ -82,7 +85,7 @@ def test_the_same_key_gives_the_same_law(giesekus_problem, trained):
 
 @pytest.mark.slow
 def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem):
-    law = recipes.make_network(jax.random.key(3), 5, True)
+    law = of_random_weights(3, 5)
     active = jnp.array([True, False, True])
     loss = float(recipes.paper_loss(law.network, law, giesekus_problem, active, 0.01))
     problem = giesekus_problem
@@ -141,56 +144,10 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
         )
         for kind, rate in (("shear", 2.0), ("uniaxial", 0.8))
     ]
-    problem = make_problem(runs, np.ones(1), np.ones(1))
+    problem = make_problem(runs, Fluid())
     recorded = problem.records.recorded
     # the training grid errs by 4e-6 of the stress in shear; extension stretches faster
     assert float(jnp.max(jnp.abs(problem.predicted(Giesekus(0.3)) - recorded))) < 1e-4
-    law = recipes.make_network(jax.random.key(1), 3, True)
+    law = of_random_weights(1, 3)
     along = told_as_differences(problem, law, 1e-5, 1e-6)
     np.testing.assert_allclose(along.recorded, problem.predicted(law), atol=1e-10)
-
-
-START = np.array([-1.2, 1.0])
-
-
-def valley(x):
-    """Return residuals of Rosenbrock's valley and their derivatives, not finite where x₁ > 2."""
-    if not x[1] < 2.0:
-        return Linearised(np.full(2, np.nan), np.full((2, 2), np.inf))
-    rows = np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
-    return Linearised(rows, np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]))
-
-
-def descended(start, steps):
-    descent = Steps(start)
-    norms = []
-    for _ in range(steps):
-        descent.take(valley(descent.trial))
-        norms.append(descent.norm)
-    return descent, norms
-
-
-def test_it_ends_where_scipy_does():
-    expected = by_scipy(lambda x: valley(x).rows, START, method="lm").x
-    descent, norms = descended(START, 60)
-    # both to rounding: the residuals vanish
-    np.testing.assert_allclose(descent.best, expected, atol=1e-6)
-    assert np.all(np.diff(norms) <= 0.0)
-
-
-def test_a_trial_that_runs_away_is_a_rejected_step():
-    descent = Steps(START)
-    descent.take(valley(descent.trial))
-    first, norm = descent.trial, descent.norm
-    descent.take(Linearised(np.array([np.inf, np.nan]), np.full((2, 2), np.nan)))
-    assert np.array_equal(descent.best, START)
-    assert descent.norm == norm
-    # a shorter step is tried next
-    assert 0.0 < np.linalg.norm(descent.trial - START) < np.linalg.norm(first - START)
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_start_that_runs_away_is_told_by_its_norm():
-    descent, norms = descended(np.array([0.0, 3.0]), 2)
-    assert not np.any(np.isfinite(norms))
-    assert np.array_equal(descent.best, [0.0, 3.0])

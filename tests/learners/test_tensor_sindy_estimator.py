@@ -8,7 +8,7 @@ from shared_flows import LIBRARY, small_dataset, with_normal_stresses
 from sklearn.model_selection import GridSearchCV, KFold
 
 from discover.errors import InputError
-from discover.laws import Fluid, Giesekus, LibraryExpansion
+from discover.laws import Fluid, Giesekus, LibraryExpansion, UpperConvectedMaxwell
 from discover.learners.tensor_sindy import OPTIMISERS, TensorSINDy
 from discover.simulate import simulate
 
@@ -148,9 +148,8 @@ def test_modes_share_one_law_of_which_not_even_the_relaxation_is_known():
         replace(run, stress=simulate(truth, run.protocol, run.time).shear_stress)
         for run in small_dataset("ucm")
     ]
-    model = TensorSINDy(
-        LIBRARY, modulus=modulus, relaxation_time=relaxation_time, known_relaxation=False
-    ).fit(runs)
+    known = Fluid(UpperConvectedMaxwell(False), modulus, relaxation_time)
+    model = TensorSINDy(LIBRARY, base=known).fit(runs)
     assert set(found(model)) == {"sigma", "sigma.sigma"}
     assert found(model)["sigma"] == pytest.approx(1.0, abs=1e-4)
     assert found(model)["sigma.sigma"] == pytest.approx(0.3, abs=1e-4)

@@ -237,11 +237,10 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
 
 def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement():
     def shifted(one, temperature, factor):
-        told = {"temperature_C_measured": temperature}
-        return replace(one, instrument_time=factor * one.time, conditions=told)
+        return replace(one, instrument_time=factor * one.time, temperature_C=temperature)
 
-    fitted = [shifted(one, -10.005, 0.01) for one in FITTED]
-    cold = [shifted(record(f"cold {rate:g}", rate, 0.2, True), -23.2, 0.1) for rate in (2.0, 5.0)]
+    fitted = [shifted(one, -10.0, 0.01) for one in FITTED]
+    cold = [shifted(record(f"cold {rate:g}", rate, 0.2, True), -23.0, 0.1) for rate in (2.0, 5.0)]
     told = range_of([*fitted, *cold])
     assert told.rate_1_s == pytest.approx((0.1, 1.0))  # where the moduli and times hold
     assert list(told.by_temperature) == [-10.0]
@@ -253,7 +252,7 @@ def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement(
     # what was not shifted, or has no known temperature, is told as it is
     assert not range_of(FITTED).by_temperature
     assert not range_of([*fitted, FITTED[0]]).by_temperature
-    at_reference = replace(FITTED[0], conditions={"temperature_C": -35.0})
+    at_reference = replace(FITTED[0], temperature_C=-35.0)
     assert list(range_of([*fitted, at_reference]).by_temperature) == [-10.0, -35.0]
 
 

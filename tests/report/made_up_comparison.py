@@ -8,10 +8,10 @@ from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.learners import RecoveredTerm
+from discover.learners.lack_of_fit import LackOfFit
 from discover.loop import ErrorPair, LoopResult
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
-from discover.statistics import LackOfFit
 from discover.study import RunFolder
 from tensor_library.law_terms import LawTerms
 
@@ -42,14 +42,13 @@ def flow(name, kind):
     )
 
 
-def outcome(learner, number, predicted):
+def outcome(learner, number, predicted, verdict="explained"):
     """Return an outcome in which every number that may be missing is `number`."""
     ends = None if number is None else (number, number)
     term = RecoveredTerm("sigma.sigma", 0.2, coefficient_penalised=number, ci95=ends)
     path = [{**ROW, "size": 0, "support": [], "misfit": 0.4}, {**ROW}]
     for row in path:
         row["held_out"] = number
-        row["held_out_by_run"] = {"a": 0.01, "b": number, "c": 0.05}
     details = {
         "path": path,
         "inclusion": {"sigma.sigma": 0.5},
@@ -58,11 +57,8 @@ def outcome(learner, number, predicted):
     }
     stresses = {q: np.sin(TIMES) for q in ("sigma12", "N1", "N2")} if predicted else None
     keys = ("training/a", "held_out/b")
-    return LearnerOutcome(learner, (term,), 1.0, details, "ended", dict.fromkeys(keys, stresses))
-
-
-def left(verdict, misfit=0.01, correlation=0.0):
-    return LackOfFit(verdict, misfit, 0.01, correlation, 0.5, reason="made up")
+    predictions, left = dict.fromkeys(keys, stresses), LackOfFit(verdict, 0.01, 0.01, 0.0, 0.9)
+    return LearnerOutcome(learner, (term,), 1.0, details, "ended", predictions, left=left)
 
 
 def posterior(verdict, number):
@@ -85,7 +81,7 @@ def made_up(number=0.01, predicted=True, sparse="explained", network="explained"
         "known_part": "Maxwell",
         "flows": flows,
         "before": {f.key: None for f in flows},
-        "outcomes": {name: outcome(name, number, predicted) for name in learners},
+        "outcomes": {name: outcome(name, number, predicted, one) for name, one in learners.items()},
         "truth": None,
         "noise": None,
         "rivals": [rival],
@@ -95,7 +91,6 @@ def made_up(number=0.01, predicted=True, sparse="explained", network="explained"
         ],
         "posterior": posterior(sparse or network, number),
         "shares": {"tensor_sindy": 0.9},
-        "lack_of_fit": {name: left(verdict) for name, verdict in learners.items()},
     }
     return Comparison(**{**content, **changes})
 

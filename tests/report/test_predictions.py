@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from discover.comparison import Flow, LearnerOutcome
-from discover.comparison.bands import Band
 from discover.comparison.comparison import Comparison
+from discover.comparison.flows import Band
 from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.report.predictions import (

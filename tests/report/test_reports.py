@@ -16,18 +16,14 @@ from fewer_hypotheses import few_candidates
 from standing_alone import SCRIPT, stands_alone
 
 from discover.comparison import compare
-from discover.comparison.bands import Band
+from discover.comparison.flows import Band
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows, learner_lines
 from discover.report.page import safe_name
 from discover.report.plots.comparison.flows import curves, flow_picture, training_picture
-from discover.report.plots.comparison.selection import (
-    error_map_picture,
-    selection_picture,
-    third_harmonic,
-)
+from discover.report.plots.comparison.oscillations import error_map_picture, third_harmonic
 from discover.report.plots.style import SPARSE, style_sheet
 from discover.report.wording import percent
 from discover.study import RunFolder, parse_study
@@ -145,28 +141,6 @@ def test_every_picture_is_well_formed_and_names_every_curve(folder, page):
 def test_pictures_are_the_same_bytes_every_time(comparison):
     first, second = (flow_picture(comparison, comparison.judged[0]).svg for _ in range(2))
     assert first == second
-
-
-PATH = [
-    {"size": 0, "support": [], "inner": {}, "misfit": 0.4, "held_out": 0.4, "log_evidence": 0.0},
-    {
-        "size": 1,
-        "support": ["sigma.sigma"],
-        "inner": {},
-        "misfit": 0.02,
-        "held_out": 0.02,
-        "log_evidence": 450.0,
-    },
-]
-
-
-def test_the_selection_path_shows_the_likeliest_law_and_probable_terms():
-    details = {"path": PATH, "inclusion": {"sigma.sigma": 0.9}}
-    drawn = selection_picture(details)
-    assert drawn is not None
-    for label in ("likeliest", "σ·σ", "runs left out"):
-        assert label in drawn.svg
-    assert selection_picture({"path": PATH[:1]}) is None
 
 
 def test_a_curve_that_ran_away_is_left_out(comparison):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.statistics.noise.outliers import isolated, stray
+from discover.statistics.noise.outliers import isolated
 
 TIMES = np.linspace(0.05, 10.0, 200)
 WAVE = np.sin(2.0 * TIMES)
@@ -17,7 +17,7 @@ def correlated(rho, generator, size=0.02, n=200):
     return size * drawn
 
 
-@pytest.mark.parametrize("share", [0.02, 0.1])
+@pytest.mark.parametrize("share", [0.02, 0.05])
 def test_spikes_of_thirty_times_the_noise_are_found(share):
     generator = np.random.default_rng(0)
     found = there = 0
@@ -26,7 +26,7 @@ def test_spikes_of_thirty_times_the_noise_are_found(share):
         off[:3] = off[-3:] = False
         spikes = 0.02 * 30.0 * off * generator.choice([-1.0, 1.0], 200)
         record = WAVE + correlated(0.0, generator) + spikes
-        found += np.count_nonzero(stray(WAVE - record, record) & off)
+        found += np.count_nonzero(isolated(record) & off)
         there += np.count_nonzero(off)
     # some stand side by side, and cannot be told from something real
     assert found > 0.7 * there
@@ -39,7 +39,7 @@ def test_noise_has_fewer_than_one_outlier_in_a_thousand_samples(correlation, siz
     count = 0
     for _ in range(20):
         noise = size * correlated(correlation, generator)
-        count += np.count_nonzero(stray(-noise, WAVE + noise))
+        count += np.count_nonzero(isolated(WAVE + noise))
     assert count <= 4  # of 4000
 
 
@@ -55,19 +55,14 @@ def test_peaks_and_steps_are_no_outliers(samples, noise):
     for record in (peak, friction, np.abs((time % 2.0) - 1.0)):
         drawn = record + noise * generator.standard_normal(samples)
         assert not np.any(isolated(drawn))
-        # nor are they to a model that has them not, or a sample too late
-        assert not np.any(stray(-drawn, drawn))
-        assert np.count_nonzero(stray(np.roll(record, 1) - drawn, drawn)) == 0
 
 
 @pytest.mark.parametrize("at", [1, 2, -3, -2, -1])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_knock_near_an_end_is_an_outlier_of_a_fit_and_of_the_record_alone(at, sign):
-    one, other = (WAVE + correlated(0.0, np.random.default_rng(seed)) for seed in (2, 3))
-    one[at] = one[at - 1] + sign * 30.0 * 0.02
-    assert np.flatnonzero(stray(WAVE - one, one)).tolist() == [at % 200]
-    other[at] += sign * 30.0 * 0.02
-    assert np.flatnonzero(isolated(other)).tolist() == [at % 200]
+def test_a_knock_near_an_end_is_an_outlier(at, sign):
+    record = WAVE + correlated(0.0, np.random.default_rng(3))
+    record[at] += sign * 30.0 * 0.02
+    assert np.flatnonzero(isolated(record)).tolist() == [at % 200]
 
 
 @pytest.mark.parametrize("ringing", [1, 3, 8])
@@ -75,13 +70,13 @@ def test_what_rings_at_the_start_is_no_outlier(ringing):
     """An instrument that settles in a few samples: what is off in them is real."""
     record = WAVE + correlated(0.0, np.random.default_rng(2))
     record[:ringing] += 30.0 * 0.02 * 0.8 ** np.arange(ringing) * (-1.0) ** np.arange(ringing)
-    assert not np.any(stray(WAVE - record, record)[:ringing])
+    assert not np.any(isolated(record)[:ringing])
 
 
 def test_what_gives_way_at_the_end_is_no_outlier():
     record = WAVE + correlated(0.0, np.random.default_rng(2))
     record[-4:] -= 30.0 * 0.02 * np.arange(1.0, 5.0)
-    assert not np.any(stray(WAVE - record, record))
+    assert not np.any(isolated(record))
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])

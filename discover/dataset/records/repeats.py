@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import PchipInterpolator
 
 from discover.dataset.run import LARGEST, Run
 from discover.errors import InputError
@@ -18,8 +15,8 @@ from discover.statistics.residual import fast_part
 
 _SAME = 0.02  # relative difference of rates, and of what runs.csv says of two runs, that is none
 _FEWEST_SAMPLES = 10
-# share of the longer run that both must cover for their difference to tell an error of all of it,
-# or for their rates to be held against each other there alone
+# share of the longer run that both must cover for their rates to be held against each other there
+# alone
 _SHARED = 0.5
 _FEWEST = 8  # samples at the same times; of fewer, equal digits may be chance
 # of what changes from sample to sample: two records of one test differ by √2 of it, one record
@@ -27,33 +24,6 @@ _FEWEST = 8  # samples at the same times; of fewer, equal digits may be chance
 _ROUNDED = 0.1
 # What a source counts or sums up of a record, and no condition of the test
 _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_sequence_s")
-
-
-class Repeats(NamedTuple):
-    """Runs that repeat one another, and by how much they differ."""
-
-    groups: tuple[tuple[str, ...], ...]  # names of those whose difference counts, by test
-    # relative error of one run: root-mean-square of the difference of two, over √2 and over that of
-    # the record; of several tests the root-mean-square
-    error: float
-
-
-def repeats_among(runs: Sequence[Run]) -> Repeats | None:
-    """Return which runs of one test (`repeated_tests`) repeat one another; None where none does.
-
-    Counted are those that cover half of each other and differ by no more than loadings do.
-    """
-    named = {run.name: run for run in runs}
-    groups, squares = [], []
-    for group in repeated_tests(runs):
-        pairs = combinations([named[name] for name in group], 2)
-        told = {(one.name, other.name): _difference(one, other) for one, other in pairs}
-        told = {pair: error for pair, error in told.items() if error <= LARGEST}
-        if told:
-            among = {name for pair in told for name in pair}
-            groups.append(tuple(name for name in group if name in among))
-            squares.append(np.mean(np.square([*told.values()])))
-    return Repeats(tuple(groups), float(np.sqrt(np.mean(squares)))) if groups else None
 
 
 def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
@@ -118,16 +88,6 @@ def _common_times(one: Run, other: Run) -> np.ndarray | None:
     fewer, more = sorted((one, other), key=len)
     inside = (fewer.time >= more.time[0]) & (fewer.time <= more.time[-1])
     return fewer.time[inside] if np.count_nonzero(inside) >= _FEWEST_SAMPLES else None
-
-
-def _difference(one: Run, other: Run) -> float:
-    """Return the relative error of one of two runs; infinite where they share too little."""
-    times = _common_times(one, other)
-    if times is None or _share(one, other, times) < _SHARED:
-        return float("inf")
-    records = [PchipInterpolator(run.time, run.recorded)(times) for run in (one, other)]
-    size = rms(records) or 1.0
-    return float(np.sqrt(np.mean((records[0] - records[1]) ** 2) / 2.0)) / size
 
 
 def is_copy(one: Run, other: Run) -> bool:

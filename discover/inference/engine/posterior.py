@@ -18,8 +18,7 @@ from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
 from discover.linear_algebra_threads import in_one_thread
-from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
-from discover.statistics.noise.whiteness import FEWEST_TESTED
+from discover.statistics.noise.whiteness import FEWEST_TESTED, smooth_misfit_probability
 
 NONE = 0.3
 """Prior probability that something has no name; on development seeds of judged worlds anything from
@@ -285,17 +284,6 @@ def _left_by(search: Search, fit: Fit, known: Sequence[Discrepancy]) -> Discrepa
     return next(same, None) or Discrepancy(search.fitter, fit, least)
 
 
-def left_by_run(fitter: Fitter, fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return what a fit leaves of each run, over its size, and the record in Pa.
-
-    Not of runs that leave no more than the noise that is always there.
-    """
-    rows = fitter.rows
-    left = (fitter.record(fit) - rows.recorded) / rows.size
-    own = [rows.run == i for i in np.flatnonzero(rows.rms_by_run(left) > _SEEN * LEAST)]
-    return [left[at] for at in own], [rows.recorded[at] for at in own]
-
-
 def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
     """Return the log odds of a smooth misfit that no curve follows, and noise would be slow.
 
@@ -303,7 +291,11 @@ def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
     hums is no first-order noise either. A probability p as noise speaks against it by a factor of
     −1/(e p ln p) at most   [Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62].
     """
-    rows = [row for row in left_by_run(fitter, fit)[0] if len(row) >= FEWEST_TESTED]
+    rows = fitter.rows
+    left = (fitter.record(fit) - rows.recorded) / rows.size
+    # not of runs that leave no more than the noise that is always there
+    loud = np.flatnonzero(rows.rms_by_run(left) > _SEEN * LEAST)
+    rows = [row for run in loud if len(row := left[rows.run == run]) >= FEWEST_TESTED]
     p = smooth_misfit_probability(rows) if rows else 1.0
     if p >= np.exp(-1.0):
         return -np.inf

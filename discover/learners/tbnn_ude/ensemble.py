@@ -2,15 +2,14 @@
 
 Shear stress cannot distinguish many laws, and networks with other weights on the same tensors end
 in the same one, so the ways differ: less likely laws that were met, other first tensors, other
-initial weights, or draws from what the data leave of the weights. Where constants suffice, members
-learn from halves of the runs. What those that fit disagree on, the data leave open. All share the
-compiled programs of the first.
+initial weights, or draws from what the data leave of the weights, or of the constants where these
+suffice. What those that fit disagree on, the data leave open. All share the compiled programs of
+the first.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
@@ -18,7 +17,7 @@ from discover.laws import TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
-from discover.learners.tbnn_ude.recipes import train_along, train_constants
+from discover.learners.tbnn_ude.recipes import train_along
 from discover.learners.tbnn_ude.session import Progress
 
 FITS = 1.25
@@ -39,21 +38,13 @@ def train_others(
     progress: Progress | None = None,
 ) -> tuple[list[Trained], str]:
     """Return one more member for each key, and in words how they came about."""
-    n_runs = len(problem.flows)
-    if not first.varies and n_runs < 2:
-        return [first] * len(keys), "a single run has no halves: members do not differ"
-    if not first.varies:
-        law = first.law
-        halves = [seen_in(problem, half) for half in halves_of_runs(n_runs, len(keys), keys[0])]
-        members = [
-            train_constants(half, law.linear_relaxation, recipe, law.base) for half in halves
-        ]
-        return members, "trained on halves of the runs"
     members = list(first.others[: len(keys)])
-    if first.left_out:
+    if first.left_out or not first.varies:
         drawn = posterior_draws(first.law, problem, keys[len(members) :], FITS)
+        how = "held to more variation, or " * bool(members)
+        what = "weights" if first.varies else "constants"
         members += [replace(first, law=law, penalised_law=law) for law in drawn]
-        return members, "held to more variation, or drawn from what the data leave of the weights"
+        return members, f"{how}drawn from what the data leave of the {what}"
     raced = min([first, *members], key=lambda one: len(one.tensors))
     # what the first one needed later may have been the better beginning
     starts = sorted(first.passed_over, key=lambda tensor: tensor not in raced.tensors)
@@ -67,22 +58,6 @@ def train_others(
             train_along(problem, key, first.law, [g for g in groups if g], recipe, progress)
         )
     return members, "trained from other tensors and from other initial weights"
-
-
-def halves_of_runs(
-    n_runs: int, n_halves: int, key: Key[Array, ""]
-) -> list[Bool[np.ndarray, " runs"]]:
-    """Return halves of the runs: every other one (they are ordered), the rest, then at random."""
-    even = np.arange(n_runs) % 2 == 0
-    halves = [even, ~even]
-    rng = np.random.default_rng(np.asarray(jax.random.key_data(key)))
-    halves += [rng.permutation(even) for _ in range(n_halves - 2)]
-    return halves[:n_halves]
-
-
-def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> TrainingProblem:
-    """Return the problem with only some of the runs counting; its shapes stay the same."""
-    return replace(problem, records=problem.records.only(runs))
 
 
 def choose_member(

@@ -5,7 +5,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -14,12 +13,12 @@ import numpy as np
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
+from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
-from discover.learners.settings import PerMode, default_library, law_below
+from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
@@ -44,18 +43,12 @@ class TBNNUDE(RunPrediction):
     Parameters
     ----------
     recipe
-        ``"default"`` (Levenberg–Marquardt, constants first; see `recipe_default`), ``"thorough"``
-        (the same, with nothing left out where there are many modes, runs and steps), ``"paper"``
-        (Adam, 7,200 iterations; see `recipe_paper`), or a `DefaultRecipe` or `PaperRecipe`.
-    modulus, relaxation_time
-        G in Pa and λ in s, numbers, or arrays with one value for each mode.
-    known_relaxation
-        Whether −σ is known. If not, the network has to find it too.
-    base_law
-        A known dimensionless law to which the network is added; by default UCM.
+        ``"default"`` (least squares, constants first), ``"thorough"`` (the same, with nothing left
+        out where there are many modes, runs and steps), ``"paper"`` (Adam, 7,200 iterations), or a
+        `DefaultRecipe` or `PaperRecipe`.
     base
-        The known `Fluid`, in place of `modulus`, `relaxation_time`, `base_law`,
-        `known_relaxation` and `solvent_viscosity`.
+        The known `Fluid` to whose law the network is added; by default UCM with 1 Pa and 1 s. With
+        ``UpperConvectedMaxwell(False)`` not even −σ is known: the network has to find it too.
     n_members
         Networks that reach the data by different ways (see `ensemble`). The likeliest of those that
         fit is taken, without noise the simplest; what they disagree on, the data leave open.
@@ -68,8 +61,6 @@ class TBNNUDE(RunPrediction):
         Seed of the initial weights.
     progress
         Called with a line of text and the fraction done, or None.
-    solvent_viscosity
-        η_s in Pa s.
 
     Attributes
     ----------
@@ -109,29 +100,24 @@ class TBNNUDE(RunPrediction):
     _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
     recipe: str | DefaultRecipe | PaperRecipe = "default"
-    modulus: PerMode = 1.0
-    relaxation_time: PerMode = 1.0
-    known_relaxation: bool = True
-    base_law: AbstractConstitutiveLaw | None = None
     n_members: int = 3
     projection_library: TermLibrary | None = None
     quick: bool = False
     random_state: int = 0
     progress: Progress | None = None
     base: Fluid | None = None
-    solvent_viscosity: float = 0.0
 
     def _learn(self, runs: list[Run], known: Fluid, shorten: bool = True) -> None:
         started = time.perf_counter()
         recipe = self._recipe()
-        whole = held = problem = _problem(runs, known)
+        whole = held = problem = make_problem(runs, known)
         followed, fitted = runs, ""
         if isinstance(recipe, DefaultRecipe):
             if shorten and known.law.linear_relaxation:
                 followed, problem = shorter_where_it_pays(
                     runs,
                     whole,
-                    lambda shorter: _problem(shorter, known),
+                    lambda shorter: make_problem(shorter, known),
                     np.asarray(known.relaxation_time),
                     recipe.affordable,
                 )
@@ -240,12 +226,6 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[Run], known: Fluid, **limits: Any) -> TrainingProblem:
-    modes = np.asarray(known.modulus), np.asarray(known.relaxation_time)
-    viscosity = float(known.solvent_viscosity)
-    return make_problem(runs, *modes, solvent_viscosity=viscosity, base=known.law, **limits)
-
-
 _WORTH_TRAINING_ON = 1.5
 """Times fewer steps from which a rough grid pays; a law is tested on a grid of its own."""
 
@@ -257,11 +237,11 @@ def _rougher(
     fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
     said = []
     if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
-        problem = _problem(fewer, known)
+        problem = make_problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
     limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
     if limits is not None and known.law.linear_relaxation:
-        rough = _problem(fewer, known, **limits)
+        rough = make_problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
         if share >= _WORTH_TRAINING_ON:
             problem = rough

@@ -19,6 +19,7 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude import variational
 from discover.learners.tbnn_ude.least_squares import cloud_of, law_misfit, relative_misses
 from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.statistics import independent_samples
 
 
 def surprises(
@@ -27,7 +28,7 @@ def surprises(
     """Return −2 ln E of every law; the least is the likeliest.
 
     Infinite for a law that diverges in the training flows, or in them at twice the rate, if another
-    does not. The noise is what the best law leaves; correlated samples count as fewer (AR(1)).
+    does not. The noise is what the best law leaves; correlated samples count as fewer.
     """
     along = [variational.trajectories(law, problem) for law in laws]
     misses = [np.asarray(relative_misses(one, problem)) for one in along]
@@ -117,9 +118,6 @@ def _sensitivities(
     return rebuild, acts, np.asarray(columns)[..., acts].reshape(-1, int(np.sum(acts)))
 
 
-def _independent(misses: Float[np.ndarray, "runs n"], mask: np.ndarray) -> float:
+def _independent(misses: Float[np.ndarray, "runs n"], seen: Bool[np.ndarray, "runs n"]) -> float:
     """Return the effective number of independent samples of the residuals."""
-    pairs = mask[:, 1:] & mask[:, :-1]
-    product = np.sum(np.where(pairs, misses[:, 1:] * misses[:, :-1], 0.0))
-    correlation = np.clip(product / max(float(np.sum(misses**2)), 1e-300), 0.0, 0.99)
-    return float(np.sum(mask) * (1.0 - correlation) / (1.0 + correlation))
+    return sum(independent_samples(row[own]) for row, own in zip(misses, seen, strict=True))

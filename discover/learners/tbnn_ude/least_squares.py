@@ -1,16 +1,14 @@
-"""Levenberg–Marquardt on trajectories and prior together, one step at a time."""
+"""Least squares on trajectories and prior together."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
-from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.linalg import cho_factor, cho_solve
+from scipy import optimize
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
@@ -19,7 +17,6 @@ from discover.learners.tbnn_ude.variational import (
     Rebuild,
     rebuilt,
     side_by_side,
-    states_and_jacobian,
     trajectories,
 )
 from discover.programs import compiled, on_device
@@ -130,91 +127,13 @@ def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:
     return PriorWeights(1e-5 * every, every)
 
 
-# The first damping is one, which is to be small beside the curvature: that of weights is far below
-_OF_WEIGHTS = 30.0
-
-# Of what a step promised, the shares from which on it is taken, and from which on the damping falls
-_LEAST_KEPT, _MOST_KEPT = 0.01, 0.99
-_MORE_DAMPING, _LESS_DAMPING = 4.0, 1.0 / 3.5
-
-
-class Linearised(NamedTuple):
-    """Objective around some parameters: residuals (rows,), and derivatives (rows, p)."""
-
-    rows: Float[Array, " rows"]
-    matrix: Float[Array, "rows p"]
-
-
-class Steps:
-    """Levenberg–Marquardt descent step by step, from linearisations computed elsewhere.
-
-    Damping of a trust region [Moré 1978; constants: Gould et al. 2005, 4OR 3, 227, as optimistix],
-    in NumPy: a program for each shape would take longer to compile than its steps take.
-
-    Attributes
-    ----------
-    best, norm
-        The best parameters so far, shape (p,), and the norm of the residuals there.
-    trial
-        The parameters where the objective is to be linearised next.
-    """
-
-    def __init__(self, start: Float[Array | np.ndarray, " p"]):
-        self.best = self.trial = np.asarray(start)
-        self.norm = np.nan
-        self._damping = 1.0
-        self._known: tuple[np.ndarray, ...] | None = None
-
-    def goes_up(self, rows: Float[Array | np.ndarray, " rows"]) -> bool:
-        """Return whether a trial with these residuals is rejected; the next one is then nearer."""
-        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
-            found, promised = self._gains(_OF_WEIGHTS * np.asarray(rows))
-        if self._known is None or found <= _LEAST_KEPT * promised:
-            return False
-        self._damping *= _MORE_DAMPING
-        self._find_trial()
-        return True
-
-    def take(self, linearised: Linearised) -> None:
-        """Take the step to the trial if it goes down, and find the next trial."""
-        if self.goes_up(linearised.rows):
-            return
-        rows, matrix = (_OF_WEIGHTS * np.asarray(part) for part in linearised)
-        found, promised = self._gains(rows)
-        if found < _MOST_KEPT * promised:
-            self._damping *= _LESS_DAMPING
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.best, self.norm = self.trial, float(np.linalg.norm(rows)) / _OF_WEIGHTS
-            self._known = rows, matrix, matrix.T @ matrix, matrix.T @ rows
-        self._find_trial()
-
-    def _gains(self, rows: np.ndarray) -> tuple[float, float]:
-        """Return the change of the squares at the trial, and what the derivatives promised."""
-        if self._known is None:
-            return 0.0, 0.0
-        before, matrix, *_ = self._known
-        promised = np.sum((before + matrix @ (self.trial - self.best)) ** 2) - np.sum(before**2)
-        found = float(np.sum(rows**2) - np.sum(before**2))
-        return found if np.isfinite(found) else np.inf, float(promised)
-
-    def _find_trial(self) -> None:
-        assert self._known is not None
-        _, _, curvature, slope = self._known
-        damped = curvature + self._damping * np.eye(len(slope))
-        self.trial = np.full_like(self.best, np.nan)
-        if np.all(np.isfinite(damped)) and np.all(np.isfinite(slope)):
-            with suppress(np.linalg.LinAlgError):  # more damping is asked for
-                self.trial = self.best - cho_solve(cho_factor(damped), slope)
-
-
 _PATIENCE = 4
 _LEAST_PROGRESS = 1e-3
-_MOST_REJECTED = 8
 _FAIR_STEPS = 4
 _FAR_BEHIND = 5.0
+_ROUNDING = 1e-12  # relative change of the weights that is none
 
 Callback = Callable[[float], None]
-Integrate = Callable[[Array, Rebuild, TrainingProblem], tuple[Along, Float[Array, "runs n p"]]]
 
 
 class Objective(eqx.Module):
@@ -226,15 +145,17 @@ class Objective(eqx.Module):
     prior: PriorWeights
 
 
-def linearise(
-    weights: Float[Array, " p"], objective: Objective, integrate: Integrate = states_and_jacobian
-) -> Linearised:
-    """Return the objective around some weights.
+def residual(weights: Float[Array, " p"], objective: Objective) -> Float[np.ndarray, " rows"]:
+    """Return the residuals of data and prior, a twelfth of the work of `derivatives`."""
+    law = rebuilt(objective.rebuild, weights)
+    misses = np.asarray(law_misfit(law, objective.problem))
+    prior = prior_residual(law, objective.cloud, objective.prior)
+    return np.append(misses, np.asarray(prior))
 
-    The integration is a program apart from the solver's step: inside it, it compiles as long again.
-    Outside of a transformation it may be done by `side_by_side`.
-    """
-    along, jacobian = integrate(weights, objective.rebuild, objective.problem)
+
+def derivatives(weights: Float[Array, " p"], objective: Objective) -> Float[Array, "rows p"]:
+    """Return the derivatives of `residual` by the weights."""
+    along, jacobian = side_by_side(weights, objective.rebuild, objective.problem)
     return _with_prior(weights, objective, along, jacobian)
 
 
@@ -245,23 +166,12 @@ def _with_prior(weights, objective, along, jacobian):
     def prior(weights):
         return prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
 
-    rows = jnp.concatenate([misses.ravel(), prior(weights)])
-    matrix = jnp.concatenate([data.reshape(misses.size, -1), jax.jacfwd(prior)(weights)])
-    return Linearised(rows, matrix)
-
-
-def residual(weights: Float[Array, " p"], objective: Objective) -> Float[np.ndarray, " rows"]:
-    """Return the residuals of `linearise` alone, which cost a twelfth where a network varies."""
-    law = rebuilt(objective.rebuild, weights)
-    misses = np.asarray(law_misfit(law, objective.problem))
-    prior = prior_residual(law, objective.cloud, objective.prior)
-    return np.append(misses, np.asarray(prior))
+    return jnp.concatenate([data.reshape(misses.size, -1), jax.jacfwd(prior)(weights)])
 
 
 class Stopping:
     """Stopping rule of a descent: at its target, or when steps no longer pay.
 
-    Rejected steps teach the damping, so only steps taken count, unless many are rejected in a row.
     `target`: misfit that is accepted. `pace`: misfits of a rival after each of its steps; a descent
     far behind it is given up.
     """
@@ -269,28 +179,20 @@ class Stopping:
     def __init__(self, target: float, pace: Sequence[float] | None = None):
         self.target = target
         self.pace = pace
-        self.steps = 0
-        self.taken: list[float] = []
-        self.rejected = 0
+        self.misfits: list[float] = []
 
     def done(self, misfit: float) -> bool:
         """Return whether to stop, given the misfit after another step."""
-        self.steps += 1
-        if np.isfinite(misfit):
-            if self.taken and misfit == self.taken[-1]:
-                self.rejected += 1
-            else:
-                self.taken.append(misfit)
-                self.rejected = 0
-        if misfit < self.target or self.rejected >= _MOST_REJECTED or self._far_behind(misfit):
+        self.misfits.append(misfit)
+        if misfit < self.target or self._far_behind(misfit):
             return True
-        recent = self.taken[-_PATIENCE - 1 :]
+        recent = self.misfits[-_PATIENCE - 1 :]
         return len(recent) > _PATIENCE and recent[0] - recent[-1] < _LEAST_PROGRESS * recent[0]
 
     def _far_behind(self, misfit: float) -> bool:
-        if self.pace is None or self.steps < _FAIR_STEPS:
+        if not self.pace or len(self.misfits) < _FAIR_STEPS:
             return False
-        return not misfit < _FAR_BEHIND * self.pace[min(self.steps, len(self.pace)) - 1]
+        return not misfit < _FAR_BEHIND * self.pace[min(len(self.misfits), len(self.pace)) - 1]
 
 
 def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
@@ -308,20 +210,33 @@ def minimise(
     weights: Float[Array, " p"], objective: Objective, steps: int, callback: Callback | None = None,
     target: float = 0.0, pace: Sequence[float] | None = None,
 ) -> Float[Array, " p"]:  # fmt: skip
-    """Return better weights after at most `steps` Levenberg–Marquardt steps.
+    """Return better weights after at most `steps` trials of a trust region.
 
-    `callback`: called after every step with the relative misfit of the best weights. `target`,
-    `pace`: as of `Stopping`.
+    `callback`: called after every step that goes down with the relative misfit there. `target`,
+    `pace`: as of `Stopping`. Weights whose law diverges are returned as they are.
     """
-    descent, stopping = Steps(weights), Stopping(target, pace)
-    # of constants the derivatives cost nothing beside the states
-    costly = objective.rebuild.template.network is not None
-    for _ in range(steps):
-        trial = on_device(descent.trial)
-        if not (costly and descent.norm > 0.0 and descent.goes_up(residual(trial, objective))):
-            descent.take(linearise(trial, objective, side_by_side))
+    stopping, start = Stopping(target, pace), np.asarray(weights)
+
+    def rows(values: Float[np.ndarray, " p"]) -> Float[np.ndarray, " rows"]:
+        return residual(on_device(values), objective)
+
+    def matrix(values: Float[np.ndarray, " p"]) -> Float[np.ndarray, "rows p"]:
+        found = np.asarray(derivatives(on_device(values), objective))
+        return np.where(np.isfinite(found), found, 0.0)
+
+    def after_step(intermediate_result: optimize.OptimizeResult) -> None:
+        misfit = float(np.sqrt(2.0 * intermediate_result.cost))
         if callback is not None:
-            callback(descent.norm)
-        if stopping.done(descent.norm) or not np.isfinite(descent.norm):
-            break
-    return on_device(descent.best)
+            callback(misfit)
+        if stopping.done(misfit):
+            raise StopIteration
+
+    if not np.all(np.isfinite(rows(start))):
+        return weights
+    # when steps no longer pay is for `stopping` to say
+    never = {"ftol": None, "gtol": None, "xtol": _ROUNDING}
+    with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
+        found = optimize.least_squares(
+            rows, start, matrix, max_nfev=steps + 1, callback=after_step, **never
+        )
+    return on_device(found.x)

@@ -13,7 +13,7 @@ from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import observed_on_grid
 from discover.forward.of_fluids import pieces_in_time
-from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
 from discover.programs import on_device
 from discover.statistics.noise.noise_model import rms
 
@@ -46,10 +46,6 @@ class Records(eqx.Module):
     def seen(self) -> Bool[np.ndarray, "runs n"]:
         """Whether a value was recorded and is looked at."""
         return np.asarray(self.weight) > 0
-
-    def only(self, keep: Bool[np.ndarray, " runs"]) -> "Records":
-        """Return the records of which only some runs are looked at."""
-        return Records(self.recorded, on_device(np.where(keep[:, None], self.weight, 0.0)))
 
     def residual(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
         """Return predictions minus records, weighted; zero where none is looked at."""
@@ -107,20 +103,15 @@ class TrainingProblem(eqx.Module):
 
 
 def make_problem(
-    runs: Sequence[Run], modulus: Float[np.ndarray, " k"], relaxation_time: Float[np.ndarray, " k"],
-    strain_step: float = STRAIN_STEP, solvent_viscosity: float = 0.0, known_relaxation: bool = True,
-    base: AbstractConstitutiveLaw | None = None, **limits: Any,
-) -> TrainingProblem:  # fmt: skip
+    runs: Sequence[Run], known: Fluid, strain_step: float = STRAIN_STEP, **limits: Any
+) -> TrainingProblem:
     """Return the training problem of some runs.
 
-    `modulus`, `relaxation_time`: modes, in Pa and s. `strain_step`: of the integration; the error
-    of the default, 4e-6 of the stress, is far below what a network reaches. `known_relaxation`:
-    whether the fluid relaxes in these times; ignored with `base`, the known law whose steps are
-    followed, by default UCM. `**limits`: of steps, as of `make_grid`. Raises InputError if a record
-    is zero throughout.
+    `known`: fluid whose modes the network serves and whose steps are followed. `strain_step`: of
+    the integration; the error of the default, 4e-6 of the stress, is far below what a network
+    reaches. `**limits`: of steps, as of `make_grid`. Raises InputError if a record is zero
+    throughout.
     """
-    law = UpperConvectedMaxwell(known_relaxation) if base is None else base
-    known = Fluid(law, modulus, relaxation_time)
     flows = lay_out(
         [run.protocol for run in runs],
         [run.time for run in runs],
@@ -134,9 +125,9 @@ def make_problem(
         flows,
         Records.of(runs),
         on_device(np.array([rms(stress) for stress in own])),
-        on_device(modulus),
-        on_device(relaxation_time),
-        on_device(solvent_viscosity),
+        on_device(np.asarray(known.modulus)),
+        on_device(np.asarray(known.relaxation_time)),
+        on_device(float(known.solvent_viscosity)),
     )
 
 

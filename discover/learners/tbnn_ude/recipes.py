@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -98,18 +97,6 @@ def work(problem: TrainingProblem) -> float:
     return float(problem.modulus.size * problem.flows.n_steps)
 
 
-def train_constants(
-    problem: TrainingProblem,
-    linear_relaxation: bool,
-    recipe: DefaultRecipe,
-    base_law: AbstractConstitutiveLaw | None,
-) -> Trained:
-    """Return the law of few constants that explains some runs: the recipe's first stage alone."""
-    session = Session(problem, recipe, None)
-    penalised, law = session.constants(without_network(linear_relaxation, base_law))
-    return _finish(session, law, penalised, False, "constant coefficients")
-
-
 def train_along(
     problem: TrainingProblem, key: PRNGKeyArray, found: TensorBasisNetwork,
     groups: Sequence[Sequence[int]], recipe: DefaultRecipe, progress: Progress | None,
@@ -163,18 +150,6 @@ class PaperRecipe:
     learning_rate: float = 1e-3  # of Adam, with decay rates 0.9 and 0.999
     penalty: float = 0.01  # factor κ on the sum of absolute weights
     iterations_per_series: int = 900  # iterations for each series added; 8 × 900 = 7,200 in all
-
-
-def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> TensorBasisNetwork:
-    """Return the network at the start of training."""
-    law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
-    network: Any = law.network
-    last = network.layers[-1]  # its bias is there: the network is made with one
-    return eqx.tree_at(
-        lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
-        law,
-        (_INITIAL_OUTPUT * last.weight, jnp.zeros_like(last.bias)),
-    )
 
 
 def _with_series(problem: TrainingProblem, active: Bool[Array, " runs"]) -> TrainingProblem:
@@ -249,8 +224,7 @@ def train_paper(
     iteration, total and loss. `base_law`: known law to which the network is added.
     """
     recipe = recipe or PaperRecipe()
-    law = make_network(key, recipe.width, linear_relaxation)
-    law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
+    law = initial_law(key, recipe.width, linear_relaxation, None, base_law, _INITIAL_OUTPUT)
     network = law.network
     state = _adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))
     n_runs = len(problem.flows)

@@ -22,17 +22,21 @@ def initial_law(
     key: PRNGKeyArray,
     width: int,
     linear_relaxation: bool,
-    invariant_scale: Float[Array, "8"],
+    invariant_scale: Float[Array, "8"] | None,
     base_law: AbstractConstitutiveLaw | None = None,
+    output: float = 0.0,
 ) -> TensorBasisNetwork:
-    """Return a law with h = 0: the last layer starts at zero, the hidden ones at random."""
+    """Return a law at the start: hidden layers at random, the last one by default at zero (h = 0).
+
+    `output`: factor on the random weights of the last layer.
+    """
     law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
     law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
     last = law.network.layers[-1]
     law = eqx.tree_at(
         lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
         law,
-        (jnp.zeros_like(last.weight), jnp.zeros_like(last.bias)),
+        (output * last.weight, jnp.zeros_like(last.bias)),
     )
     return eqx.tree_at(
         lambda tree: tree.invariant_scale, law, invariant_scale, is_leaf=lambda leaf: leaf is None

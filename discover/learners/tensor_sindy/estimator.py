@@ -5,18 +5,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from pysindy.optimizers import BaseOptimizer
 
 from discover.dataset.run import Run
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.left_out import left_out
-from discover.laws import AbstractConstitutiveLaw, Fluid
+from discover.laws import Fluid
 from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import PerMode, check_library, default_library, law_below
+from discover.learners.settings import check_library, default_library, law_below
 from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.search import (
@@ -47,20 +46,10 @@ class TensorSINDy(RunPrediction):
         one in the invariants.
     optimizer
         ``"stlsq"``, ``"sr3"``, ``"ssr"``, ``"frols"``, or a pysindy optimiser.
-    modulus, relaxation_time
-        G in Pa and λ in s, numbers, or arrays with one value for each mode.
-    solvent_viscosity
-        η_s in Pa s.
-    known_relaxation
-        Whether −σ is known. If not, the learner has to find ``sigma`` too.
-    base_law
-        A known dimensionless law to which terms are added; by default UCM.
     base
-        The known `Fluid`, in place of `modulus`, `relaxation_time`, `solvent_viscosity`,
-        `base_law`, `known_relaxation` and `modulus_covariance`.
-    modulus_covariance
-        Of the moduli in Pa, as a sweep leaves them, shape (k, k), in Pa squared: evidence and
-        intervals allow for it. None where the moduli are exact.
+        The known `Fluid` to whose law terms are added; by default UCM with 1 Pa and 1 s. Evidence
+        and intervals allow for errors of its moduli. With ``UpperConvectedMaxwell(False)`` not even
+        −σ is known: the learner has to find ``sigma`` too.
     random_state
         Taken as every learner takes it; nothing here is random.
     use_normal_stresses
@@ -111,16 +100,10 @@ class TensorSINDy(RunPrediction):
 
     library: TermLibrary | None = None
     optimizer: str | BaseOptimizer = "stlsq"
-    modulus: PerMode = 1.0
-    relaxation_time: PerMode = 1.0
-    solvent_viscosity: float = 0.0
-    known_relaxation: bool = True
-    base_law: AbstractConstitutiveLaw | None = None
     use_normal_stresses: bool = False
     max_terms: int = 5
     progress: Progress | None = None
     base: Fluid | None = None
-    modulus_covariance: Float[np.ndarray, "c c"] | None = None
     random_state: int = 0
 
     def _learn(self, runs: list[Run], known: Fluid) -> None:

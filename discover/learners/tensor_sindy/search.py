@@ -9,11 +9,11 @@ from jaxtyping import Float
 from discover.dataset.run import Run
 from discover.effects.library_term import library_term
 from discover.errors import InputError
-from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Key, Search
 from discover.laws import Fluid
+from discover.learners.lack_of_fit import declared_as
 from discover.learners.settings import ARITHMETIC
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.progress import require_wanted
@@ -44,20 +44,8 @@ def library_problem(
                 "more. Leave out one of the two."
             )
         observed += [run.observing(quantity) for run in runs for quantity in run.beside]
-    covariance = known.modulus_covariance
-    declared = DeclaredModel(
-        known.law,
-        np.asarray(known.modulus),
-        np.asarray(known.relaxation_time),
-        float(known.solvent_viscosity),
-        modulus_covariance=None if covariance is None else np.asarray(covariance),
-    )
-    return Problem(
-        declared,
-        [library_term(term) for term in library.terms],
-        observed,
-        computed=True,
-    )
+    terms = [library_term(term) for term in library.terms]
+    return Problem(declared_as(known), terms, observed, computed=True)
 
 
 @dataclass(frozen=True)

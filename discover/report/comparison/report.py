@@ -16,11 +16,7 @@ from discover.report.comparison.tables import learner_lines
 from discover.report.first_screen import answer_screen
 from discover.report.page import Missing, attempt, made_by, render, safe_name
 from discover.report.plots.comparison.flows import flow_picture, start_up_picture, training_picture
-from discover.report.plots.comparison.selection import (
-    error_map_picture,
-    high_deborah_picture,
-    selection_picture,
-)
+from discover.report.plots.comparison.oscillations import error_map_picture, high_deborah_picture
 from discover.report.plots.style import Picture
 from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
 from discover.study.run_folder import RunFolder
@@ -30,8 +26,6 @@ Drawn = Picture | Missing
 
 def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn]]:
     """Return the pictures of what was found, and those of training."""
-    sparse = comparison.outcomes.get("tensor_sindy")
-    details = {} if sparse is None else sparse.details
     found: list[tuple[str, Callable[[], Picture | None]]] = []
     for flow in comparison.judged:
         draw = flow_picture if flow.oscillatory else start_up_picture
@@ -41,7 +35,6 @@ def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn
         found.append(runs)
     found += [
         ("The map of errors", partial(error_map_picture, comparison)),
-        ("The picture of the selection", partial(selection_picture, details)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
     ]
     return _drawn(found), _drawn([runs] if comparison.judged else [])
@@ -62,10 +55,6 @@ SECTIONS: Mapping[tuple[str, str, str], Mapping[str, str]] = {
     },
     ("classical", "Against the classical laws", "Classical laws"): {
         "classical": "The table of classical laws"
-    },
-    ("selection-path", "Which law to believe", "Which law to believe"): {
-        "selection": "The path of laws",
-        "held_out_by_run": "The misfits on runs left out",
     },
     ("open", "Not determined", "Not determined"): {
         "statements": "What is not determined",

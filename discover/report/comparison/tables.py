@@ -11,7 +11,7 @@ from discover import words
 from discover.comparison import Comparison, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
-from discover.equations.spelling.markup import law_element, sum_elements, term_element
+from discover.equations.spelling.markup import law_element, sum_elements
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words as quantities_in_words
@@ -26,51 +26,16 @@ from discover.report.wording import (
 )
 
 
-def selection(comparison: Comparison) -> dict[str, Any] | None:
-    """Return the sparse learner's path, or None where there is none.
-
-    A misfit is None where a law diverges in a run left out.
-    """
-    sparse = comparison.outcomes.get("tensor_sindy")
-    path = [] if sparse is None else sparse.details.get("path") or []
-    if sparse is None or not path:
-        return None
-    highest = max((row["log_evidence"] for row in path), default=0.0)
-    rows = [
-        {
-            "size": row["size"],
-            "math": " + ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
-            "misfit": row["misfit"],
-            "held_out": row["held_out"],
-            "range": list(_by_run(row).values()),
-            "behind": highest - row["log_evidence"],
-        }
-        for row in path
-    ]
-    spelled = _titles(comparison)
-    runs = [
-        {"title": spelled.get(name, name), "errors": [_by_run(row).get(name) for row in path]}
-        for name in _by_run(path[0])
-    ]
-    return {"rows": rows, "runs": runs}
-
-
-def _by_run(row: Mapping[str, Any]) -> Mapping[str, float | None]:
-    return row.get("held_out_by_run") or {}
-
-
 def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the errors in flows that no fit saw, with half of the band where there is one."""
     rows = []
     for flow in comparison.judged:
-        band = comparison.claimed(flow)
-        of_posterior = {} if band is None else band.half_widths()
         cells = []
         for who in ("before", *comparison.outcomes):
+            band = None if who == "before" else comparison.outcomes[who].bands.get(flow.key)
             if who == "tensor_sindy":
-                widths = of_posterior if comparison.determined_terms else {}
-            else:
-                widths = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+                band = comparison.claimed(flow) if comparison.determined_terms else None
+            widths = {} if band is None else band.half_widths()
             finite = {name: width for name, width in widths.items() if known(width)}
             law = comparison.before if who == "before" else comparison.outcomes[who].predictions
             cells += [

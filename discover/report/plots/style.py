@@ -21,6 +21,7 @@ from matplotlib.path import Path
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
+from discover.dataset.run_table import wave_of
 from discover.learners.registry import LEARNERS
 
 COLOURS = {
@@ -374,12 +375,15 @@ def make_percentage(axis) -> None:
     axis.set_minor_formatter(FuncFormatter(between))
 
 
-def in_last_cycle(times: Float[np.ndarray, " n"], frequency: float) -> Bool[np.ndarray, " n"]:
-    """Return which samples lie in the last cycle, a little more so that it closes.
+def last_cycle(
+    times: Float[np.ndarray, " n"], shear_rate: Float[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"] | None:
+    """Return which samples lie in the last cycle of a rate, a little more so that it closes.
 
-    `times` in s, increasing, shape (n,). `frequency`: angular, in 1/s.
+    `times`: in s, increasing. `shear_rate`: in 1/s. None where it does not oscillate.
     """
-    return times >= times[-1] - 2.0 * np.pi / frequency * 1.02
+    wave = wave_of(times, shear_rate)
+    return None if wave is None else times >= times[-1] - 1.02 * 2.0 * np.pi / wave[0]
 
 
 def about_middle(

@@ -1,26 +1,21 @@
-"""Outliers of records, and of fits to them."""
+"""Outliers of records."""
 
 from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import median_filter
 
 _WIDEST = 2  # samples side by side that may be off together
 _BESIDE = 3  # samples on either side by which they are judged
 _ABOVE_NOISE = 6.0
 """Robust standard deviations of the noise. Three extrapolations must be missed by so much, to one
 side: of Gaussian noise one sample in more than ten thousand does."""
-_ABOVE_SPREAD = 8.0
-"""Robust standard deviations of a residual. Of noise in proportion to a wave the crest has 1.6
-times the median's."""
 _ABOVE_BENDS = 2.0
 """Times the sharpest bend of what remains: a real peak, or step, leaves a record that is bent."""
 _BENDS_BEFORE = 8  # samples whose bends are compared with what stands apart near an end
 _MOST_DROPPED = 0.2  # of the samples of a record
 _NEIGHBOURHOOD = 31
 _PASSES = 5
-_SMOOTH = 5
 
 
 def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
@@ -41,19 +36,6 @@ def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     return _set_aside(left, len(values), apart)
 
 
-def stray(
-    residual: Float[np.ndarray, " n"], record: Float[np.ndarray, " n"]
-) -> Bool[np.ndarray, " n"]:
-    """Return which samples are outliers of a fit.
-
-    Those of the record (`isolated`), and those that a model misses by far more than around, where
-    the record is off too: not a step that a model takes late. Never the first sample.
-    """
-    missed, values = np.asarray(residual, dtype=float), np.asarray(record, dtype=float)
-    left = np.flatnonzero(~isolated(record))
-    return _set_aside(left, len(values), lambda left: _missed_alone(missed[left], values[left]))
-
-
 def _set_aside(
     left: Int[np.ndarray, " m"], n: int, find: Callable[[np.ndarray], np.ndarray]
 ) -> Bool[np.ndarray, " _"]:
@@ -67,39 +49,6 @@ def _set_aside(
         left = left[~found]
     off = np.ones(n, dtype=bool)
     off[left] = False
-    return off
-
-
-def _missed_alone(
-    residual: Float[np.ndarray, " n"], record: Float[np.ndarray, " n"]
-) -> Bool[np.ndarray, " n"]:
-    """Return which samples are missed more than those around, and are off them in the record."""
-    missed = residual - median_filter(residual, _SMOOTH, mode="nearest")
-    halfway = np.abs(np.convolve(residual, [-0.5, 1.0, -0.5], "valid")) / np.sqrt(1.5)
-    spread = _local_spread(halfway, len(residual), 1)
-    far = np.abs(missed) > _ABOVE_SPREAD * spread
-    off = np.zeros(len(record), dtype=bool)
-    for width in range(1, _WIDEST + 1):
-        start, excess, _ = _excess(record, width)
-        for i in range(width):
-            at = start + i
-            off[at] |= far[at] & (-np.sign(missed[at]) * excess > 0.5 * np.abs(missed[at]))
-    # so near an end that nothing can be extrapolated: alone, and beyond both samples beside it; the
-    # last beyond what comes before it. The first may be what an instrument needs to settle
-    start, end = residual[:_NEIGHBOURHOOD], residual[-_NEIGHBOURHOOD:]
-    for at in [*range(1, _BESIDE), *range(len(record) - _BESIDE, len(record))]:
-        level = np.median(start if at < _BESIDE else end)
-        here = slice(at - 1, at + 2)
-        apart = np.abs(residual[here] - level) > _ABOVE_SPREAD * spread[here]
-        ahead = record[at] - np.array([*record[at - 1 : at], *record[at + 1 : at + 2]])
-        if at == len(record) - 1:
-            ahead = np.append(ahead, record[at] - 2.0 * record[at - 1] + record[at - 2])
-        away = level - residual[at]
-        off[at] |= (
-            apart[1]
-            & (np.count_nonzero(apart) == 1)
-            & (np.min(np.sign(away) * ahead) > 0.5 * np.abs(away))
-        )
     return off
 
 
@@ -194,13 +143,12 @@ def _excess(values: Float[np.ndarray, " n"], width: int):
 
 
 def _local_noise(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return the standard deviation of what changes from sample to sample, around each sample."""
-    return _local_spread(np.abs(np.diff(values, 3)) / np.sqrt(20.0), len(values), 1)
+    """Return the robust deviation of what changes from sample to sample, around each sample.
 
-
-def _local_spread(sizes: Float[np.ndarray, " m"], n: int, first: int) -> Float[np.ndarray, " _"]:
-    """Return the robust standard deviation around each of n samples; at an end that next to it."""
+    At an end it is that next to it.
+    """
+    sizes = np.abs(np.diff(values, 3)) / np.sqrt(20.0)
     width = min(_NEIGHBOURHOOD, len(sizes))
-    middle = np.clip(np.arange(n) - first - width // 2, 0, len(sizes) - width)
+    middle = np.clip(np.arange(len(values)) - 1 - width // 2, 0, len(sizes) - width)
     medians = np.median(np.lib.stride_tricks.sliding_window_view(sizes, width), axis=1)
     return 1.4826 * medians[middle]

@@ -50,7 +50,8 @@ def curves(comparison: Comparison, flow: Flow):
 def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
-    last = last_cycle(flow)
+    cycle = look.last_cycle(flow.times, flow.rate)
+    last = np.ones(flow.times.size, dtype=bool) if cycle is None else cycle
     strain = look.about_middle(flow.strain, last)[last]
     closed = {"elastic": (strain, "strain γ"), "viscous": (flow.rate[last], rate_label)}
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
@@ -174,7 +175,8 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
     members = None if network is None else network.bands.get(flow.key)
     if members is not None:
         label = "networks that fit as well"
-        limits.append((*members[quantity], look.learner_style("tbnn_ude")["color"], label))
+        colour = look.learner_style("tbnn_ude")["color"]
+        limits.append((members.low[quantity], members.high[quantity], colour, label))
     band = comparison.claimed(flow)
     if band is not None and np.any(np.isfinite(band.low[quantity])):
         limits.append((band.low[quantity], band.high[quantity], look.SPARSE, "95 % band"))
@@ -242,18 +244,3 @@ def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> N
     low, high = float(np.min(joined)), float(np.max(joined))
     margin = 0.15 * (high - low) or 1.0
     panel.set_ylim(low - margin, high + margin)
-
-
-def last_cycle(flow: Flow) -> np.ndarray:
-    """Return which samples of a flow lie in its last cycle, a little more so that it closes."""
-    frequencies = np.asarray(flow.protocol.frequencies)
-    active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
-    if active.size and np.min(active) > 0:
-        return look.in_last_cycle(flow.times, float(np.min(active)))
-    # of a rate that was measured, from where the strain last crossed its middle in this sense
-    strain = flow.strain - 0.5 * (np.max(flow.strain) + np.min(flow.strain))
-    turns = np.flatnonzero((strain[1:] > 0.0) & (strain[:-1] <= 0.0))
-    if turns.size < 2:
-        return np.ones(flow.times.size, dtype=bool)
-    period = float(np.median(np.diff(flow.times[turns])))
-    return look.in_last_cycle(flow.times, 2.0 * np.pi / period)

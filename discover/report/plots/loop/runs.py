@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from discover.loop import LoopResult, RunRecord
-from discover.loop.reading import oscillation
 from discover.protocols.kinematics import MODULI
 from discover.report.plots import style as look
 from discover.report.wording import free_form_sentence, percent, recorded_symbol
@@ -183,14 +182,15 @@ def lissajous_picture(result: LoopResult) -> look.Picture | None:
 
     The widest runs are shown, those held out before those fitted.
     """
-    found = [(r, w) for r in result.records if (w := oscillation(r)) is not None]
+    found = [
+        (r, last) for r in result.records if (last := look.last_cycle(r.time, r.rate)) is not None
+    ]
     found.sort(key=lambda pair: (not pair[0].held_out, -float(np.ptp(pair[0].strain))))
     shown = found[:_MOST_DRAWN]
     if not shown:
         return None
     with look.figure(2, len(shown), width=10.0, height=2.3) as (drawing, axes):
-        for column, (record, frequency) in enumerate(shown):
-            last = look.in_last_cycle(record.time, frequency)
+        for column, (record, last) in enumerate(shown):
             strain = look.about_middle(record.strain, last)
             for panel, along in ((axes[0, column], strain), (axes[1, column], record.rate)):
                 if not np.all(last):
