@@ -49,9 +49,10 @@ class LackOfFit:
             return "Does not describe the fitted runs: the integration diverges in one of them."
         if self.verdict == "explained":
             said = f"Fits within the noise of {percent_of(self.noise)}"
-            if self.lag_one_correlation < _SLOW:
+            slow = self.lag_one_correlation
+            if slow < _SLOW:
                 return f"{said}."
-            return f"{said}, if that is correlated to {self.lag_one_correlation:.2g} from sample to sample."
+            return f"{said}, if that is correlated to {slow:.2g} from sample to sample."
         return (
             f"Describes the fitted runs to {percent_of(self.misfit)}; the rest is systematic "
             f"(noise: {percent_of(self.noise)})."

@@ -98,14 +98,15 @@ def test_a_normal_stress_that_is_determined_holds_within_two_bands(
         size, time = rms(run.N1), run.columns["time_s"]
         value, half = run.N1 + off * size, (np.nan if half_band is None else half_band) * size
         band = {"value": value, "low": value - half, "high": value + half}
-        rows[name, "N1", "tensor_sindy"] = {"time": time, **band}
+        rows[name, "N1", "posterior"] = {"time": time, **band}
         exact = {"time": time, "value": run.columns["stress_Pa"]}
-        rows[name, "sigma12", "tensor_sindy"] = {
+        rows[name, "sigma12", "posterior"] = {
             **exact,
             "low": time + np.nan,
             "high": time + np.nan,
         }
-    said = {"verdict": "explained", "learners": {"tensor_sindy": {"terms": []}}}
+    posterior = {"effects": [], "inclusion": {}, "unexplained_probability": 0.0}
+    said = {"verdict": "explained", "posterior": posterior}
     said |= {"undetermined": [], "statements": [], **statement}
     found = judge(KNOWN, "compare", said, rows, clean, noisy)["false"]
     assert bool(found) == false
