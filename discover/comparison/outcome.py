@@ -54,19 +54,21 @@ class LearnerOutcome(TermTables):
     def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
         """Return the outcome that was kept."""
 
-        def arrays(values: Mapping[str, Any] | None) -> dict[str, np.ndarray] | None:
-            return values and {name: np.asarray(one, dtype=float) for name, one in values.items()}
+        def arrays(values: Mapping[str, Any]) -> dict[str, np.ndarray]:
+            return {name: np.asarray(one, dtype=float) for name, one in values.items()}
 
+        predictions, left = state["predictions"], state.get("left")
+        if left is not None:  # JSON has no number that is none
+            known: dict[str, Any] = {key: np.nan if v is None else v for key, v in left.items()}
+            left = LackOfFit(**known)
         read = {
             "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
-            "predictions": {key: arrays(own) for key, own in state["predictions"].items()},
+            "predictions": {key: own and arrays(own) for key, own in predictions.items()},
             "bands": {
                 key: Band(**{end: arrays(values) for end, values in own.items()})
                 for key, own in state["bands"].items()
             },
-            # JSON has no number that is none
-            "left": (left := state.get("left"))
-            and LackOfFit(**{key: np.nan if one is None else one for key, one in left.items()}),
+            "left": left,
         }
         return cls(**{**state, **read})
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any, cast
 
 import equinox as eqx
 import jax
@@ -237,6 +238,6 @@ def minimise(
     never = {"ftol": None, "gtol": None, "xtol": _ROUNDING}
     with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
         found = optimize.least_squares(
-            rows, start, matrix, max_nfev=steps + 1, callback=after_step, **never
+            rows, start, cast(Any, matrix), max_nfev=steps + 1, callback=after_step, **never
         )
     return on_device(found.x)
