@@ -236,11 +236,20 @@ def where(answer: Any) -> str:
     only = " only" * (len(quantities) == 1 and not implied)
     mean = "" if answer.adequate is not False else percent_of(answer.size)
     _, least = worst_run(answer) or ("", mean)
-    use, ends = f"Where {least} suffices, use" if least else "Use", ""
+    enough = _suffices(answer) or least
+    use, ends = f"Where {enough} suffices, use" if enough else "Use", ""
     if least and (met := answer.discrepancy and answer.discrepancy.met_up_to):
         use, ends = "Use", f": within {percent_of(answer.tolerance)} up to {met}, {least} above"
     more = f" ({listed(implied)}: predicted, not tested)" if implied else ""
     return f"{use} for {listed(quantities)}{only}{more}, {place}{ends}."
+
+
+def _suffices(answer: Any) -> str:
+    """Return the error that a use must allow for: of the worst run, or the end of its interval."""
+    over, found = _over_tolerance(answer), answer.discrepancy
+    if not over or found is None:
+        return ""
+    return percent_of(max([*over.values(), *(found.ci95 or ())]))
 
 
 def _place(answer: Any) -> str:

@@ -148,6 +148,12 @@ def test_slow_oscillation_is_a_range_that_holds_steady_shear(slowest, said):
     assert "De" not in started.headline  # steady shear goes on for longer than any run
 
 
+def test_a_use_allows_for_the_end_of_the_interval_of_the_error():
+    assert MELT.discrepancy is not None
+    wide = replace(MELT, discrepancy=replace(MELT.discrepancy, ci95=(0.04, 0.12)))
+    assert "Where 12 % suffices, use" in wide.headline
+
+
 @pytest.mark.parametrize("given", [0.0, -0.1, 2.0])
 def test_a_tolerance_that_is_none_is_refused(given):
     with pytest.raises(InputError):
