@@ -105,14 +105,24 @@ class Answer:
 
     @property
     def estimates(self) -> list[Estimate]:
-        """Constants of the law, then those of the instrument, as a summary lists them."""
-        own = [(one.name, one, "law") for one in self.constants]
+        """Constants of the law, then those of the instrument, as a summary lists them.
+
+        One that may be zero is not determined, nor is what is suspected of the instrument where
+        the law is not all there is.
+        """
+        own = [(one.name, one, "law", True) for one in self.constants]
         for suspect in self.suspects:
-            own += [(f"{suspect.effect}.{c.name}", c, "instrument") for c in suspect.constants]
+            sure = self.fits_to_the_noise and suspect.is_established
+            own += [
+                (f"{suspect.effect}.{c.name}", c, "instrument", sure) for c in suspect.constants
+            ]
         return [
-            Estimate((name,), c.value, c.ci95, c.unit, notes={"of": of, "determined": c.determined})
-            for name, c, of in own
-        ]
+            Estimate(
+                (name,), c.value, c.ci95, c.unit,
+                notes={"of": of, "determined": sure and c.determined and not c.may_be_zero},
+            )
+            for name, c, of, sure in own
+        ]  # fmt: skip
 
     def expected(self, quantity: str) -> ExpectedError:
         """Return the expected error of a quantity."""

@@ -31,6 +31,11 @@ class Constant:
     over_modes: Span | None = None  # least and largest, where it differs from mode to mode
 
     @property
+    def may_be_zero(self) -> bool:
+        """Whether its interval holds zero."""
+        return self.ci95 is not None and self.ci95[0] <= 0.0 <= self.ci95[1]
+
+    @property
     def is_term(self) -> bool:
         """Whether it is the coefficient of a term of the library."""
         return "sigma" in self.name or "gammadot" in self.name

@@ -54,7 +54,7 @@ class Suspect:
         if not self.constants:
             return True
         first = self.constants[0]
-        return first.determined and (first.ci95 is None or first.ci95[0] * first.ci95[1] > 0.0)
+        return first.determined and not first.may_be_zero
 
     @property
     def is_separate(self) -> bool:

@@ -186,6 +186,16 @@ def test_a_suspected_share_is_a_percentage_of_something_and_others_have_units():
     assert Suspect("transducer_lag", (lag,)).text == "transducer lag 0.35 s (95 % CI 0.13–0.48)"
 
 
+def test_a_suspect_is_determined_only_where_the_law_is_all_there_is_and_nothing_may_be_zero():
+    lag = Suspect("transducer_lag", (Constant("tau", 0.02, (0.01, 0.03), "s"),))
+    told = replace(MELT, suspects=(lag,))
+    for fits, wanted in ((True, [True, True]), (False, [True, False])):
+        found = replace(told, fits_to_the_noise=fits).estimates
+        assert [one.notes["determined"] for one in found] == wanted
+    open_ = replace(MELT.constants[0], ci95=(0.0, 1.0))
+    assert not replace(told, constants=(open_,)).estimates[0].notes["determined"]
+
+
 def test_ends_of_a_range_of_moduli_have_each_a_power_and_a_unit():
     modes = tuple(Mode(10.0**k, 1.0) for k in (0, 3, 5, 7))
     assert linear_part(replace(MELT, modes=modes)).startswith("G from 1 Pa to 1 × 10⁷ Pa")
