@@ -1,4 +1,6 @@
-"""The likelihood, priors and mixtures of the engine are those of textbooks, computed by scipy."""
+"""Likelihood, priors and mixtures of the engine are those of textbooks, by scipy; what it gives up."""
+
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -7,6 +9,8 @@ from scipy.stats import multivariate_normal, norm
 
 import discover as dc
 from discover.inference.engine.bands import quantiles
+from discover.inference.engine.fit import Fit
+from discover.inference.engine.fits import Fitter
 from discover.inference.engine.noise import LEAST, Noise, NoiseModel
 from discover.inference.engine.priors import Prior, Priors
 from discover.inference.engine.rows import Rows
@@ -150,3 +154,17 @@ def test_quantiles_of_a_mixture_are_those_of_its_draws():
     np.testing.assert_allclose(np.ravel(found), np.quantile(drawn, (0.025, 0.5, 0.975)), atol=0.02)
     one = quantiles(np.ones(1), np.zeros((1, 1)), np.ones((1, 1)), (0.975,))
     assert one[0][0] == pytest.approx(norm.ppf(0.975), abs=1e-9)
+
+
+def test_many_starts_of_one_set_leave_another_set_in_the_race():
+    def fit(name, log_posterior):
+        return Mock(Fit, names=(name,), log_posterior=log_posterior)
+
+    many, other = [fit("a", 100.0 - i) for i in range(5)], fit("b", 40.0)
+
+    def given_up(wanted):
+        return id(other) in Fitter.hopeless([*many, other], [other], [0.5], wanted)
+
+    # of two sets the second best stays, though four starts of the first are ahead of it
+    assert not given_up(wanted=2)
+    assert given_up(wanted=1)  # 60 behind, half a nat a round

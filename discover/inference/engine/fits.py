@@ -236,7 +236,7 @@ class Fitter:
                 going_on = self._stepped(active)
             if wanted is not None:
                 gains = [fit.log_posterior - one for fit, one in zip(active, before, strict=True)]
-                hopeless = self._hopeless([*known, *fits], active, gains, wanted)
+                hopeless = self.hopeless([*known, *fits], active, gains, wanted)
                 going_on = [fit for fit in going_on if id(fit) not in hopeless]
                 given_up |= hopeless
             active = going_on
@@ -250,11 +250,16 @@ class Fitter:
         return fits
 
     @staticmethod
-    def _hopeless(
+    def hopeless(
         fits: Sequence[Fit], active: Sequence[Fit], gains: Sequence[float], wanted: int
     ) -> set[int]:
         """Return which fits rounds of the gain of the last one do not bring near the best."""
-        near = sorted((fit.log_posterior for fit in fits), reverse=True)[:wanted][-1] - _FAR
+        # the best of each set of effects: it has several starts
+        best: dict[frozenset[str], float] = {}
+        for fit in fits:
+            key = frozenset(fit.names)
+            best[key] = max(fit.log_posterior, best.get(key, -np.inf))
+        near = sorted(best.values(), reverse=True)[:wanted][-1] - _FAR
         return {
             id(fit)
             for fit, gain in zip(active, gains, strict=True)
