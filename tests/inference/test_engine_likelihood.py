@@ -1,4 +1,4 @@
-"""Likelihood, priors and mixtures of the engine are those of textbooks, by scipy; what it gives up."""
+"""Likelihood, priors and mixtures are those of textbooks, by scipy; and what a search gives up."""
 
 from unittest.mock import Mock
 
