@@ -119,8 +119,7 @@ def slowness() -> float:
 
 
 STATES = 0.125
-"""Fraction that is done when states alone begin to be searched: most are found to be those of an
-inelastic material at once. It is of the drawing too."""
+"""Fraction that is done when states alone begin to be searched. It is of the drawing too."""
 
 
 class FollowedBy:

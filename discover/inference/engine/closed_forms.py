@@ -91,10 +91,13 @@ def _modes(law: str, constants: Constants) -> tuple[list[tuple[float, float]], f
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
     """Return the strain since rest: as recorded, or the integral of the rate."""
-    if run.strain is not None:
-        return run.strain
-    since_first = np.asarray(cumulative_trapezoid(run.rate, run.time, initial=0.0))
-    return since_first + run.rate[0] * run.time[0]
+    return integrated_rate(run) if run.strain is None else run.strain
+
+
+def integrated_rate(run: Run) -> Float[np.ndarray, " n"]:
+    """Return the strain at each sample, from rest, of the rate as it was recorded."""
+    time, rate = np.asarray(run.time), np.asarray(run.rate)
+    return rate[0] * time[0] + cumulative_trapezoid(rate, time, initial=0.0)
 
 
 def _relaxing(run: Run, time: float) -> Float[np.ndarray, " n"]:

@@ -24,6 +24,8 @@ NONE = 0.3
 """Prior probability that something has no name; on development seeds of judged worlds anything from
 0.2 to 0.5 is as good, and records that cannot tell are not called unexplained."""
 
+LOG_ODDS_OF_NONE = float(np.log(NONE / (1.0 - NONE)))
+
 WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
 
@@ -232,7 +234,7 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     logs = np.array([whole.rank(fit) for fit in judged])
     known = [*done["whole"][2], *([before.left] if before.left else [])] if before else []
     beside = [_left_by(whole, fit, known) for fit in judged[:_WITH_DISCREPANCY]]
-    nothing = [whole.rank(one.fit) + one.log_factor + np.log(NONE / (1.0 - NONE)) for one in beside]
+    nothing = [whole.rank(one.fit) + one.log_factor + LOG_ODDS_OF_NONE for one in beside]
     nothing += [whole.rank(fit) + _unlike_noise(whole.fitter, fit) for fit in judged[:1]]
     total = float(np.logaddexp.reduce([*logs, *nothing]))
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
@@ -248,7 +250,7 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
         return found
     found.left = left = _left_by(search, near[0], known)
     none = own[0] + np.logaddexp(
-        left.log_factor + np.log(NONE / (1.0 - NONE)), _unlike_noise(search.fitter, near[0])
+        left.log_factor + LOG_ODDS_OF_NONE, _unlike_noise(search.fitter, near[0])
     )
     enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > NEGLIGIBLE
     # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is

@@ -27,7 +27,7 @@ from discover.inference.engine.closed_forms import (
 )
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.posterior import NONE, SAME, Posterior
+from discover.inference.engine.posterior import LOG_ODDS_OF_NONE, SAME, Posterior
 from discover.inference.engine.priors import Prior
 from discover.linear_algebra_threads import in_one_thread
 from discover.protocols.kinematics import MODULI
@@ -53,8 +53,6 @@ that solid."""
 _AHEAD = 3.0
 """Log evidence by which a yield stress or a modulus must lead what has none: that is strong
 [Kass & Raftery 1995, J. Am. Stat. Assoc. 90, 773]."""
-
-_UNKNOWN = float(np.log(NONE / (1.0 - NONE)))
 
 _ORDER = 3.0
 """Standard deviation of the logarithm of a constant of which little is known."""
@@ -257,10 +255,10 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     if alive:
         ranks = [search.rank(one) for one in alive]
         if (left := posterior.left) is not None:
-            ranks.append(search.rank(left.fit) + left.log_factor + _UNKNOWN)
+            ranks.append(search.rank(left.fit) + left.log_factor + LOG_ODDS_OF_NONE)
         others = float(np.logaddexp.reduce(ranks))
         others -= _NEAR if is_same(fitter.record(alive[0])) else 0.0
-    unknown = rank + Discrepancy(fitted, fit).log_factor + _UNKNOWN
+    unknown = rank + Discrepancy(fitted, fit).log_factor + LOG_ODDS_OF_NONE
     # one that leaves something is told where all that relaxes leaves something too
     whole = np.logaddexp(rank, unknown) if posterior.verdict == "unexplained" else rank
     if whole < np.logaddexp(others, nothing):

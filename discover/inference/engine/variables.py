@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from discover.dataset import Run
 from discover.effects import EffectParameter, SeriesElement
+from discover.inference.engine.closed_forms import integrated_rate
 from discover.inference.engine.rows import Rows
 
 _LATE = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -162,7 +162,7 @@ def variables(rows: Rows) -> Iterator[Variable]:
     yield Variable("recorded_stress", "stress", "Pa", None, largest)
     rates, times, strains = (
         np.concatenate([one(run) for run in runs])
-        for one in (lambda r: np.asarray(r.rate), lambda r: np.asarray(r.time), _strain)
+        for one in (lambda r: np.asarray(r.rate), lambda r: np.asarray(r.time), integrated_rate)
     )
     if len(np.unique(np.abs(rates))) > KNOTS:
         yield of("rate", "shear rate", "1/s", rates)
@@ -170,13 +170,6 @@ def variables(rows: Rows) -> Iterator[Variable]:
     yield of("network", "strain", "", strains, True)
     if len(rows) > len(runs) and all(float(run.protocol.begins) == 0.0 for run in runs):
         yield Response.of(rows)
-
-
-def _strain(run: Run) -> Float[np.ndarray, " n"]:
-    """Return the strain at each sample, from rest."""
-    time, rate = np.asarray(run.time), np.asarray(run.rate)
-    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
-    return rate[0] * time[0] + np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def closed_forms(slot: str, x: Float[np.ndarray, " n"], inner: float) -> dict[str, np.ndarray]:
