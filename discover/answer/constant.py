@@ -261,5 +261,9 @@ _SYMBOLS = {
     "consistency_Pa_sn": ("K", "consistency"),
     "flow_index": ("n", "flow index"),
     "viscosity_Pa_s": ("η", "viscosity"),
+    "zero_shear_viscosity_Pa_s": ("η_0", "zero-shear viscosity"),
+    "infinite_shear_viscosity_Pa_s": ("η_∞", "infinite-shear viscosity"),
+    "critical_time_s": ("k", "critical time"),
+    "sharpness": ("a", "sharpness of the bend"),
     "elastic_modulus_Pa": ("G", "modulus"),
 }

@@ -382,6 +382,13 @@ def test_a_yield_stress_fluid_says_where_it_flows():
     assert ">" not in newtonian.formula
 
 
+def test_constants_of_a_viscosity_that_thins_have_the_letters_of_its_equation():
+    values = (50.0, 0.1, 2.0, 0.4, 2.0)
+    ends = tuple((0.9 * value, 1.1 * value) for value in values)
+    fluid = material_of(SimpleFit("carreau_yasuda", values, ends, 0.01, 5.0))
+    assert [one.symbol for one in fluid.constants] == ["η_0", "η_∞", "k", "n", "a"]
+
+
 @pytest.mark.parametrize(("evidence", "told"), [(40.0, "> 1000:1"), (2.0 * np.log(12.0), "12:1")])
 def test_an_effect_that_is_added_to_a_law_says_its_odds(evidence, told):
     result = loop_result()
