@@ -13,9 +13,11 @@ from discover.forward import AugmentedModel, make_batch
 from discover.forward.of_fluids import bare_run
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fit import Fit
+from discover.inference.engine.free_functions import WithFunction
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
 from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import transducer_of
+from discover.inference.engine.rows import Rows, transducer_of
+from discover.inference.engine.variables import SLIP_CURVE, Variable
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import misfit, weighed_laws
 from discover.loop.loop import Found
@@ -130,56 +132,76 @@ def in_flows(
 def _bands(
     found: Found, parts: Sequence[_Part], runs: Sequence[Run], as_recorded: bool
 ) -> list[Band | None]:
-    problem = found.posterior.problem
-    batch = make_batch(runs)
+    problem, rows = found.posterior.problem, Rows.of(runs)
     drawn = [_drawn(found, part.fit, runs, as_recorded) for part in parts]
-    thetas = np.concatenate([one[0] for one in drawn])
-    moduli = np.concatenate([one[1] for one in drawn])
-    gains = np.concatenate([one[2] for one in drawn])
+    thetas, moduli = (np.concatenate([one[i] for one in drawn]) for i in (0, 1))
     with np.errstate(all="ignore"):
-        predicted = np.array(problem.model.observables(thetas, batch, moduli))
-        plain = np.array(problem.model.observables([problem.zero], batch))[0]
-    predicted[..., 0] *= gains[..., None]
-    largest = float(np.max(np.abs(problem.fitted.recorded)))
+        predicted = np.array(problem.model.observables(thetas, rows.batch, moduli))
+        plain = np.array(problem.model.observables([problem.zero], rows.batch))[0]
     each, bands = 1 + 2 * _DRAWS, []
+    values = predicted.reshape(len(parts), each, *predicted.shape[1:])
+    for part, own, (_, _, gains, linear) in zip(parts, values, drawn, strict=True):
+        fitter = found.posterior.fitter_of(part.fit)
+        if isinstance(fitter, WithFunction):
+            function = fitter.variable.at(rows)
+            for stresses, sizes in zip(own, linear[:, -function.count :], strict=True):
+                _add(function, sizes, stresses, rows, as_recorded)
+        own[..., 0] *= gains[..., None]
+    largest = float(np.max(np.abs(problem.fitted.recorded)))
     for i, run in enumerate(runs):
         n = len(run)
-        values = predicted[:, i, :n].reshape(len(parts), each, n, 3)
         known = np.nan_to_num(np.abs(plain[i, :n]), nan=0.0, posinf=0.0)
         limit = _RUNS_AWAY * max(largest, float(np.max(known, initial=0.0)))
-        bands.append(_band(found, parts, values, run, limit))
+        bands.append(_band(found, parts, values[:, :, i, :n], run, limit))
     return bands
 
 
 def _drawn(found: Found, fit: Fit, runs: Sequence[Run], as_recorded: bool):
-    """Return constants, moduli and gains of a hypothesis: the likeliest, then pairs of draws.
+    """Return constants, moduli, gains and linear errors: the likeliest, then pairs of draws.
 
     A transducer that no fitted run was read by has the gain of the first.
     """
     problem = found.posterior.problem
     assert fit.covariance is not None
     lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.covariance)))
-    normal = np.concatenate([np.zeros((1, lot.shape[1])), lot, -lot])
-    thetas = fit.drawn(normal)
-    linear = fit.linear + normal @ np.linalg.cholesky(fit.covariance)[len(fit.priors) :].T
+    thetas, linear = fit.drawn(np.concatenate([np.zeros((1, lot.shape[1])), lot, -lot]))
     known = problem.transducers
     read_by = [known.index(one) if (one := transducer_of(run)) in known else 0 for run in runs]
     gains = 1.0 + as_recorded * linear[:, read_by]
-    moduli = np.tile(problem.moduli, (len(normal), 1))
+    moduli = np.tile(problem.moduli, (len(thetas), 1))
     if problem.modulus_root is not None:
-        of_runs = found.posterior.search.fitter.errors.of_runs
-        shifts = linear[:, of_runs.stop :] @ problem.modulus_root.T
+        first, root = found.posterior.search.fitter.errors.of_runs.stop, problem.modulus_root
+        shifts = linear[:, first : first + root.shape[1]] @ root.T
         moduli[:, : shifts.shape[1]] += shifts
     if not as_recorded:
         thetas[:, _of_bench(found)] = problem.zero[_of_bench(found)]
-    return thetas, moduli, gains
+    return thetas, moduli, gains, linear
+
+
+def _add(
+    function: Variable,
+    sizes: Float[np.ndarray, " knots"],
+    stresses: Float[np.ndarray, "runs n 3"],
+    rows: Rows,
+    as_recorded: bool,
+) -> None:
+    """Add a function beside a hypothesis to what this predicts, in place.
+
+    A factor that depends on the strain is of the fluid and so of all its stresses   [the damping
+    function of Wagner 1976, Rheol. Acta 15, 136]; any other is of the record of σ12.
+    """
+    if function.slot == "network":
+        assert function.values is not None
+        stresses[rows.seen] *= 1.0 + (function.basis(function.values) @ sizes)[:, None]
+    elif as_recorded:
+        stresses[rows.seen, 0] += function.columns(stresses[rows.seen, 0]) @ sizes
 
 
 def _of_bench(found: Found) -> list[int]:
     """Return positions of constants of the instrument, of the clock too where it is not fitted."""
     problem, model = found.posterior.problem, found.posterior.problem.model
     names = {n for n, e in problem.effects.items() if not isinstance(e, ConstitutiveEffect)}
-    names |= {nuisance.effect for nuisance in NUISANCES}
+    names |= {SLIP_CURVE.name, *(nuisance.effect for nuisance in NUISANCES)}
     at = [place for name in names for place in model.positions(name)]
     return at if 1 in problem.declared.free_positions else [1, *at]
 
@@ -233,7 +255,8 @@ def _band(
 def _missed(found: Found, fit: Fit, run: Run) -> float:
     """Return the deviation, over its size, by which a run may be missed, from runs left out."""
     posterior = found.posterior
-    best = fit if posterior.left is None else posterior.left.fit
+    has_curve = posterior.fitter_of(fit) is not posterior.search.fitter
+    best = fit if posterior.left is None or has_curve else posterior.left.fit
     missed, fastest = posterior.missed(best), posterior.problem.fitted.fastest
     wider = of_the_next_run(len(missed))
     worse = max(misfit(posterior, fit) / misfit(posterior, best), 1.0)

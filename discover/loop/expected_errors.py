@@ -60,7 +60,7 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     thetas, weights = [best.theta], []
     for fit, weight in weighed:
         assert fit.covariance is not None
-        thetas += [*fit.drawn(lot.standard_normal((_DRAWS, len(fit.covariance))))]
+        thetas += [*fit.drawn(lot.standard_normal((_DRAWS, len(fit.covariance))))[0]]
         weights += [weight / _DRAWS] * _DRAWS
     inside = [_run(*one) for one in _flows_inside(runs, rates)]
     fast = start_up(BEYOND * max(rates))
@@ -121,7 +121,8 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
     By their evidence where one of them is all there is. Otherwise all miss the runs, by what each
     run has in common: R misses are draws from one normal distribution of unknown deviation, whose
     density goes as the misfit to the power −R (see `by_left_out`). What fits σ12 best need not come
-    nearest in N1, so runs count half, and a term without a law keeps its lower prior odds.
+    nearest in N1, so runs count half, and a term without a law keeps its lower prior odds. A law
+    with a function beside it counts as far as that stands out.
     """
     if posterior.unexplained < 0.5:
         pairs = list(posterior.fits)
@@ -133,16 +134,18 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
             - _TEMPERED * runs * np.log(misfit(posterior, fit))
             for fit in found
         ])  # fmt: skip
-        pairs = list(zip(found, np.exp(logs - np.max(logs, initial=-np.inf)), strict=True))
+        weights = np.exp(logs - np.logaddexp.reduce(logs, initial=-np.inf))
+        pairs = posterior.beside_curves(list(zip(found, weights.tolist(), strict=True)))
     pairs = sorted(pairs, key=lambda pair: -pair[1])[:_LAWS]
-    pairs = [(f, p) for f, p in pairs if f.covariance is not None and p > _LEAST_LIKELY]
+    most = max((p for _, p in pairs), default=0.0)
+    pairs = [(f, p) for f, p in pairs if f.covariance is not None and p > _LEAST_LIKELY * most]
     total = sum(p for _, p in pairs)
     return [(fit, float(p / total)) for fit, p in pairs]
 
 
 def misfit(posterior: Posterior, fit: Fit) -> float:
     """Return what a law leaves of the fitted runs, over their size; never zero."""
-    return max(posterior.search.fitter.misfit(fit), 1e-150)
+    return max(posterior.fitter_of(fit).misfit(fit), 1e-150)
 
 
 def _flows_inside(

@@ -211,9 +211,8 @@ class Found:
         curves = free_functions(self.posterior)
         if not curves:
             return self
-        odds = float(np.logaddexp.reduce([curve.weight for curve in curves]))
         shown = [curve.form for curve in curves if curve.is_shown]
-        return replace(self, posterior=self.posterior.with_something_else(odds), curves=shown)
+        return replace(self, posterior=self.posterior.with_curves(curves), curves=shown)
 
     @cached_property
     def _reported(self) -> Posterior:

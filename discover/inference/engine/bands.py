@@ -52,7 +52,9 @@ class Predictions:
         ]
         found += [
             (none * share, *self._of_none(fit))
-            for fit, share in self._sound(posterior.by_left_out or posterior.fits)
+            for fit, share in self._sound(
+                posterior.beside_curves(posterior.by_left_out or posterior.fits)
+            )
             if none * share > NEGLIGIBLE
         ]
         return found
@@ -96,7 +98,8 @@ class Predictions:
         shared = np.zeros((len(self.rows), len(fit.linear)))
         of_transducers = self.fitter.errors.of_transducers
         shared[:, of_transducers] = linear[:, of_transducers]
-        shared[:, fitted.stop :] = linear[:, alone.stop :]
+        of_moduli = linear[:, alone.stop :]
+        shared[:, fitted.stop : fitted.stop + of_moduli.shape[1]] = of_moduli
         # zero, drift and loading of another run are as large as those of the fitted runs
         assert fit.covariance is not None
         own_variance = np.diag(fit.covariance)[len(fit.priors) :][fitted]
@@ -128,11 +131,15 @@ class Predictions:
         assert predicted is not None
         assert fit.covariance is not None
         lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.covariance)))
-        found = self.fitter.predict(fit.drawn(np.concatenate([lot, -lot])))
+        thetas, linear = fit.drawn(np.concatenate([lot, -lot]))
+        found = self.fitter.predict(thetas)
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
-        spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
         _, apart = self._jacobian(fit, predicted)
-        middle = self.fitter.errors.as_read(predicted, fit.linear)
+        errors = self.posterior.fitter_of(fit).at(self.fitter).errors
+        middle = errors.as_read(predicted, fit.linear)
+        pairs = zip(found[sound], linear[sound], strict=True)
+        off = [errors.as_read(*pair) - middle for pair in pairs]
+        spread = np.mean(np.square(off), axis=0) if off else 0.0
         noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
         missed = self.missed(fit) * self.rows.size
         return middle, spread + apart + missed**2 + noise**2

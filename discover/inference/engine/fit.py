@@ -64,11 +64,13 @@ class Fit:
         ends = self.priors.ends
         return self.priors.placed(self.theta, np.clip(coordinates, ends[:, 0], ends[:, 1]))
 
-    def drawn(self, normal: Float[np.ndarray, "draws n"]) -> Float[np.ndarray, "draws p"]:
-        """Return constants drawn from this fit, of independent normal numbers for all it holds."""
+    def drawn(
+        self, normal: Float[np.ndarray, "draws n"]
+    ) -> tuple[Float[np.ndarray, "draws p"], Float[np.ndarray, "draws q"]]:
+        """Return draws of the constants, and of what is linear, of independent normal numbers."""
         assert self.covariance is not None
-        root = np.linalg.cholesky(self.covariance)[: len(self.priors)]
-        return self.at(self.coordinates + normal @ root.T)
+        off, free = normal @ np.linalg.cholesky(self.covariance).T, len(self.priors)
+        return self.at(self.coordinates + off[:, :free]), self.linear + off[:, free:]
 
     def interval(self, position: int) -> tuple[float, float]:
         """Return the 95 % interval of a free constant by this fit alone, inside its range."""

@@ -60,6 +60,10 @@ class Fitter:
         self._shifts = np.zeros((len(rows), len(self._moduli)))
         self.errors = LinearErrors(problem, rows, self._shifts.shape[1])
 
+    def at(self, fitter: "Fitter") -> "Fitter":
+        """Return what predicts other rows as this one does; `fitter` has only the model."""
+        return fitter
+
     def noise_of(self, fit: Fit) -> NoiseModel:
         """Return the likelihood of the rows that a fit sees."""
         if fit.without not in self._without:

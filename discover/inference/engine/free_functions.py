@@ -7,7 +7,7 @@ hypothesis like any other: changes of slope at a few knots, each normal about ze
 by the same evidence.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -18,11 +18,20 @@ from scipy.stats import chi2
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.linear_errors import LinearErrors
-from discover.inference.engine.posterior import Posterior
+from discover.inference.engine.posterior import TOLD, WINDOW, Posterior
 from discover.inference.engine.priors import Deviations, Prior
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.search import Search
-from discover.inference.engine.variables import KNOTS, SLIP_CURVE, Variable, closed_forms, variables
+from discover.inference.engine.variables import (
+    INNER,
+    KNOTS,
+    SLIP_CURVE,
+    ClosedForm,
+    Response,
+    Variable,
+    closed_forms,
+    variables,
+)
 from discover.linear_algebra_threads import in_one_thread
 from discover.statistics import HALF_BAND
 
@@ -46,11 +55,6 @@ _BEHIND = 30.0
 _SMALL = 1e-4
 """Of the typical fluidity: step of a difference."""
 
-_TOLD = 15.0
-"""Log odds against all that has a name and any other discrepancy, from which on a curve is shown.
-On development seeds one that is there has 35 and more; one that stands for a law of no dictionary,
-up to 10."""
-
 _POSSIBLE = -7.0
 """Log odds from which on a curve is among what is possible, shown or not."""
 
@@ -59,6 +63,8 @@ _WORTH_IT = -20.0
 
 _POINTS = 61
 _TRIED = 60
+_LAWS = 4  # With which a function of closed form is fitted
+_SETTLED = 4  # Rounds after which an inner constant stands still
 _USUAL = 0.95
 _RESOLVED = 0.05
 
@@ -88,18 +94,22 @@ class FreeForm:
 class FreeFunction:
     """A curve as a hypothesis.
 
-    `log_odds`: against all that has a name, and any discrepancy of another kind, by the fitted
-    runs. `log_odds_in_all`: the same by all runs, as explanations are weighed.
+    `fits`: hypotheses beside which it is possible, fitted with it, with weights that add up to one,
+    the likeliest first. `fitter`: what fitted them. `log_odds`: against all that has a name, and
+    any discrepancy of another kind, by the fitted runs. `log_odds_in_all`: the same by all runs, as
+    explanations are weighed.
     """
 
     form: FreeForm
+    fits: tuple[tuple[Fit, float], ...]
+    fitter: "WithFunction | WithSlip"
     log_odds: float
     log_odds_in_all: float
 
     @property
     def is_shown(self) -> bool:
         """Whether it stands out so far that the runs have a curve of this shape."""
-        return self.log_odds > _TOLD
+        return self.log_odds > TOLD
 
     @property
     def weight(self) -> float:
@@ -113,24 +123,32 @@ class _WithColumns(LinearErrors):
     def __init__(self, errors: LinearErrors, variable: Variable, width: float):
         self.__dict__.update(vars(errors))
         self.variable, first = variable, len(errors)
-        self.deviations = [*errors.deviations, (slice(first, first + KNOTS), Deviations(width))]
+        self.deviations = [
+            *errors.deviations,
+            (slice(first, first + variable.count), Deviations(width)),
+        ]
 
     def columns(self, predicted, shifts):
         """Return what one of each does to the records, in Pa."""
-        own = self.variable.columns(predicted, self.rows.size)
+        own = self.variable.columns(predicted)
         return np.column_stack([super().columns(predicted, shifts), own])
+
+    def as_read(self, predicted, sizes):
+        """Return records by what transducers do and the function."""
+        own = self.variable.columns(predicted) @ sizes[-self.variable.count :]
+        return super().as_read(predicted, sizes) + own
 
     def recorded(self, predicted, sizes, shifts):
         """Return records of trials, of what the model predicts of each."""
         own = [
-            self.variable.columns(one, self.rows.size) @ values[-KNOTS:]
+            self.variable.columns(one) @ values[-self.variable.count :]
             for one, values in zip(predicted, sizes, strict=True)
         ]
         return super().recorded(predicted, sizes, shifts) + own
 
     def through(self, slopes, predicted, sizes):
         """Return derivatives of the records, of those of what the model predicts."""
-        own = self.variable.change(slopes, predicted, self.rows.size, sizes[-KNOTS:])
+        own = self.variable.change(slopes, predicted, sizes[-self.variable.count :])
         return super().through(slopes, predicted, sizes) + own
 
 
@@ -143,30 +161,59 @@ class WithFunction(Fitter):
 
     def __init__(self, fitter: Fitter, variable: Variable, width: float):
         self.__dict__.update(vars(fitter))
-        self.variable, self.width = variable, width
+        self.bare, self.variable, self.width = fitter, variable, width
         self.errors = _WithColumns(fitter.errors, variable, width)
 
     def signatures(self, fit: Fit) -> Float[np.ndarray, "rows k"]:
         """Return what one of each change of slope does to the records, in Pa."""
-        return self.variable.columns(fit.predicted, self.rows.size)
+        return self.variable.columns(fit.predicted)
+
+    def at(self, fitter: Fitter) -> "WithFunction":
+        """Return what predicts other rows with the function as it was fitted."""
+        return WithFunction(fitter, self.variable.at(fitter.rows), self.width)
 
     def on(self, fitter: Fitter) -> "WithFunction | None":
-        """Return the same on other rows; None where these have no such variable."""
+        """Return what fits the like to other rows; None where these have no such variable."""
         for variable in variables(fitter.rows):
             if variable.slot == self.variable.slot:
                 return WithFunction(fitter, variable, self.width)
         return None
+
+    def beside(self, base: Fit, fit: Fit) -> Fit:
+        """Return another hypothesis with the function of a fit, before its first step."""
+        return self.start(base.names, base.theta, fit.linear)
 
     def curve(self, fit: Fit) -> tuple[Variable, list[np.ndarray], str | None]:
         """Return the function, its grid, values and half band, and its closed form."""
         assert fit.covariance is not None
         variable, k = self.variable, KNOTS
         grid = variable.grid(fit.predicted, _POINTS)
-        size = 1.0 if variable.is_factor else float(np.sqrt(np.mean(self.rows.size**2)))
+        size = 1.0 if variable.is_factor else variable.scale
         sizes, covariance = fit.linear[-k:], fit.covariance[-k:, -k:]
         basis, x = size * variable.basis(grid), np.linspace(grid[0], grid[-1], k + 1)[1:]
-        nearest = _nearest(variable, x, size * variable.basis(x), sizes, covariance)
+        nearest, _ = _nearest(variable, x, size * variable.basis(x), sizes, covariance)
         return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
+
+    def closed(self, fits: Sequence[Fit]) -> "tuple[WithFunction, list[Fit]]":
+        """Return hypotheses with the closed form that is nearest to the function of the first.
+
+        It leaves less open than a curve with as many bends as this has.
+        """
+        variable, best = self.variable, fits[0]
+        assert best.covariance is not None
+        x = np.linspace(0.0, variable.largest, KNOTS + 1)[1:]
+        sizes, covariance = best.linear[-KNOTS:], best.covariance[-KNOTS:, -KNOTS:]
+        _, (form, inner, amount) = _nearest(variable, x, variable.basis(x), sizes, covariance)
+        closed, found = ClosedForm.of(variable, form, inner), list(fits)
+        start, fitter, q = np.array([amount, 0.0]), self, len(self.bare.errors)
+        for _ in range(_SETTLED):
+            fitter = WithFunction(self.bare, closed, _WIDTHS[-1])
+            found = fitter.fit([
+                fitter.start(fit.names, fit.theta, np.append(fit.linear[:q], start))
+                for fit in found
+            ])  # fmt: skip
+            closed, start = closed.moved(found[0].linear[-2:]), found[0].linear[-2:] * [1.0, 0.0]
+        return fitter, found
 
 
 class WithSlip(Fitter):
@@ -192,20 +239,28 @@ class WithSlip(Fitter):
         """Return the same on other rows."""
         return WithSlip(fitter, self.width)
 
+    at = on
+
     def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
         """Return the priors of all that is free, those of the curve last."""
         own = Prior("normal", 0.0, self.width * self.problem.scales["fluidity"])
         return {**self.problem.priors(names), **dict.fromkeys(self._at, own)}
 
+    def beside(self, base: Fit, fit: Fit) -> Fit:
+        """Return another hypothesis with the function of a fit, before its first step."""
+        theta = base.theta.copy()
+        theta[self._at] = fit.theta[self._at]
+        return self.start(base.names, theta, fit.linear)
+
     def curve(self, fit: Fit) -> tuple[Variable, list[np.ndarray], str | None]:
         """Return the function, its grid, values and half band, and its closed form."""
         assert fit.covariance is not None
         grid = np.linspace(0.0, float(np.max(np.abs(fit.predicted))), _POINTS)
-        variable = Variable("slip", "stress", "Pa", None, float(grid[-1]))
+        variable = Variable("slip", "stress", "Pa", None, float(grid[-1]), 1.0)
         at = [fit.free.index(position) for position in self._at]
         sizes, covariance = fit.theta[self._at], fit.covariance[np.ix_(at, at)]
         basis, x = self._basis(grid), np.linspace(0.0, grid[-1], KNOTS + 1)[1:]
-        nearest = _nearest(variable, x, self._basis(x), sizes, covariance)
+        nearest, _ = _nearest(variable, x, self._basis(x), sizes, covariance)
         return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
 
     def _basis(self, stress: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n bends"]:
@@ -227,6 +282,7 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
     """Return the functions that are possible beside all other explanations, the likeliest first.
 
     They are tried beside hypotheses of few effects: a larger one may have taken up what they are.
+    A small one may have too, so what is possible is fitted beside all of these.
     """
     search, problem, left = posterior.search, posterior.problem, posterior.left
     rows = search.fitter.rows
@@ -243,34 +299,53 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
     whole, _, discrepancies = posterior.memory["whole"]
     other, in_all = _likeliest(search, [left]), _likeliest(whole, discrepancies)
     prior, found = problem.log_odds_of(TERM_ODDS), []
+
+    def rank_of(fit: Fit) -> float:
+        return search.rank(fit) + prior
+
     functions: list[list[WithFunction | WithSlip]] = [
         [WithFunction(search.fitter, variable, width) for width in _WIDTHS]
         for variable in variables(rows)
     ]
     functions.append([WithSlip(search.fitter, width) for width in _SLIPS])
     for one in (_starts(search.fitter, some, [*chain(*bases)]) for some in functions):
-        fitted = [
-            (fit.log_evidence + problem.log_prior(fit.names) + prior, fitter, fit)
-            for fitter, starts in one
-            for fit in fitter.fit(starts, wanted=1)
-        ]
+        fitted = [(fitter, fit) for fitter, starts in one for fit in fitter.fit(starts, wanted=1)]
         if not fitted:
             continue
-        rank, fitter, fit = max(fitted, key=lambda one: one[0])
-        if rank - other < _WORTH_IT:
+        fitter, fit = max(fitted, key=lambda pair: rank_of(pair[1]))
+        if rank_of(fit) - other < _WORTH_IT:
             continue
+        starts = [fitter.beside(base, fit) for base in chain(*bases)]
+        curves = [fit, *fitter.fit(starts, wanted=1, known=[fit])]
+        fit, reported = max(curves, key=rank_of), fitter
         odds, again = -np.inf, fitter.on(whole.fitter)
         if again is not None:
             (refit,) = again.fit([again.start(fit.names, fit.theta)])
-            odds = refit.log_evidence - fit.log_evidence + rank - in_all
+            odds = refit.log_evidence - fit.log_evidence
+        weighed = _weighed(curves, rank_of)
+        if isinstance(fitter, WithFunction) and not isinstance(fitter.variable, Response):
+            closed, known = fitter.closed([one for one, _ in weighed[:_LAWS]])
+            if max(map(rank_of, known)) > rank_of(fit):
+                fitter, weighed = closed, _weighed(known, rank_of)
+        rank = rank_of(weighed[0][0])
+        odds += rank - in_all
         if max(rank - other, odds) > _POSSIBLE:
-            variable, (grid, value, half), nearest = fitter.curve(fit)
+            variable, (grid, value, half), nearest = reported.curve(fit)
             form = FreeForm(
                 variable.slot, variable.name, variable.unit, fit.names,
                 grid, value, value - half, value + half, nearest,
             )  # fmt: skip
-            found.append(FreeFunction(form, float(rank - other), float(odds)))
+            found.append(FreeFunction(form, weighed, fitter, float(rank - other), float(odds)))
     return sorted(found, key=lambda one: -one.log_odds)
+
+
+def _weighed(fits: Sequence[Fit], rank_of: Callable[[Fit], float]) -> tuple[tuple[Fit, float], ...]:
+    """Return the possible ones of some fits with their shares, one of each set of effects."""
+    ordered = sorted(fits, key=rank_of)
+    best = {fit.names: fit for fit in ordered if rank_of(fit) > rank_of(ordered[-1]) - WINDOW}
+    total = np.logaddexp.reduce([rank_of(fit) for fit in best.values()])
+    shares = ((fit, float(np.exp(rank_of(fit) - total))) for fit in best.values())
+    return tuple(sorted(shares, key=lambda pair: -pair[1]))
 
 
 def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
@@ -340,21 +415,24 @@ def _nearest(
     basis: Float[np.ndarray, "n k"],
     sizes: Float[np.ndarray, " k"],
     covariance: Float[np.ndarray, "k k"],
-) -> str | None:
+) -> tuple[str | None, tuple[str, float, float]]:
     """Return the closed form with the least misfit, if that is usual of the uncertain function.
 
     Where it stands at some points decides, inside of what was measured, weighed by its covariance.
+    Behind it follow the form in any case, its inner constant, and how much of it there is.
     """
     values, covariance = basis @ sizes, basis @ covariance @ basis.T
     # a bend between two knots is told to a twentieth of the curve
     covariance += (_RESOLVED * np.max(np.abs(values))) ** 2 * np.eye(len(x))
     covariance += 1e-9 * np.trace(covariance) * np.eye(len(x))  # of a curve that is nothing
     root = np.linalg.inv(np.linalg.cholesky(covariance))
-    target, best = root @ values, (np.inf, "")
-    for inner in np.linspace(0.02, 1.2, _TRIED):
+    target, best, least = root @ values, ("", 1.0, 0.0), np.inf
+    for inner in np.linspace(*INNER, _TRIED):
         for name, form in closed_forms(variable.slot, x / variable.largest, inner).items():
             own = root @ form
             square = float(own @ own)
-            left = target - own * (own @ target) / square if square else target
-            best = min(best, (float(left @ left), name))
-    return best[1] if best[0] < chi2.ppf(_USUAL, len(x) - 2) else None
+            amount = float(own @ target) / square if square else 0.0
+            misfit = float(np.sum((target - own * amount) ** 2))
+            if misfit < least:
+                best, least = (name, float(inner), amount), misfit
+    return best[0] if least < chi2.ppf(_USUAL, len(x) - 2) else None, best

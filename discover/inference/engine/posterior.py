@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +20,9 @@ from discover.inference.engine.search import Search, refitted
 from discover.linear_algebra_threads import in_one_thread
 from discover.statistics.noise.whiteness import FEWEST_TESTED, smooth_misfit_probability
 
+if TYPE_CHECKING:
+    from discover.inference.engine.free_functions import FreeFunction
+
 NONE = 0.3
 """Prior probability that something has no name; on development seeds of judged worlds anything from
 0.2 to 0.5 is as good, and records that cannot tell are not called unexplained."""
@@ -28,6 +31,11 @@ LOG_ODDS_OF_NONE = float(np.log(NONE / (1.0 - NONE)))
 
 WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
+
+TOLD = 15.0
+"""Log odds of a function of one variable against all that has a name and any other discrepancy,
+from which on it is told. On development seeds one that is there has 35 and more; one that stands
+for a law of no dictionary, up to 10."""
 
 UNLIKE_NOISE = 0.02
 """Prior probability of a smooth misfit of another kind than the curves: of one that noise has once
@@ -89,6 +97,7 @@ class Posterior:
     to the fitted runs, with their probabilities. `left`: what the likeliest hypothesis leaves of
     the fitted runs; None where none can be followed. `by_left_out`: hypotheses to rely on where
     none is all there is, as they predict fitted runs that are left out, with their weights.
+    `curves`: functions of one variable that are possible beside hypotheses, and have no name.
     """
 
     problem: Problem
@@ -98,6 +107,7 @@ class Posterior:
     fits: tuple[tuple[Fit, float], ...]
     left: Discrepancy | None
     by_left_out: tuple[tuple[Fit, float], ...] = ()
+    curves: tuple["FreeFunction", ...] = ()
     memory: dict = field(default_factory=dict)
 
     @property
@@ -117,18 +127,37 @@ class Posterior:
                 found[id(fit)] = fit, share * weight + found.get(id(fit), (fit, 0.0))[1]
         return tuple(sorted(found.values(), key=lambda pair: -pair[1]))
 
-    def with_something_else(self, log_odds: float) -> "Posterior":
-        """Return the posterior beside a further explanation that has no name.
-
-        `log_odds`: of that, over all that is possible so far.
-        """
+    def with_curves(self, curves: Sequence["FreeFunction"]) -> "Posterior":
+        """Return the posterior with functions among what may be there and has no name."""
+        log_odds = float(np.logaddexp.reduce([curve.weight for curve in curves]))
         share = 1.0 / (1.0 + float(np.exp(min(log_odds, 700.0))))
         explanations = tuple(
             replace(one, probability=share * one.probability) for one in self.explanations
         )
+        unexplained = 1.0 - share * (1.0 - self.unexplained)
         return replace(
-            self, explanations=explanations, unexplained=1.0 - share * (1.0 - self.unexplained)
+            self, explanations=explanations, unexplained=unexplained, curves=tuple(curves)
         )
+
+    def beside_curves(self, laws: Sequence[tuple[Fit, float]]) -> list[tuple[Fit, float]]:
+        """Return laws for where none is all there is, and those with a function beside them.
+
+        These count by the fitted runs, as far as they stand out beyond functions that only stand
+        for an unknown law. `laws`: with weights that add up to one.
+        """
+        odds = [curve.log_odds - TOLD for curve in self.curves]
+        law, *of_curves = np.exp(np.array([0.0, *odds]) - np.logaddexp.reduce([0.0, *odds]))
+        found = [(fit, float(law * weight)) for fit, weight in laws]
+        for curve, weight in zip(self.curves, of_curves, strict=True):
+            found += [(fit, float(weight * share)) for fit, share in curve.fits]
+        return found
+
+    def fitter_of(self, fit: Fit) -> Fitter:
+        """Return what fitted a hypothesis, with a function beside it or without."""
+        for curve in self.curves:
+            if any(one is fit for one, _ in curve.fits):
+                return curve.fitter
+        return self.search.fitter
 
     def interval(self, position: int) -> tuple[float, float] | None:
         """Return the 95 % interval of a constant, over the hypotheses in which it is free."""
@@ -180,7 +209,7 @@ class Posterior:
         Over its size.
         """
         if "missed" not in fit.memory:
-            fit.memory["missed"] = left_out(self.search.fitter, [fit])[0]
+            fit.memory["missed"] = left_out(self.fitter_of(fit), [fit])[0]
         return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - fit.noise.common**2, 0.0))
 
     @in_one_thread

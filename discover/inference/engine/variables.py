@@ -1,13 +1,14 @@
 """What a free function of one variable may depend on, and what it does to records."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from discover.dataset import Run
 from discover.effects import EffectParameter, SeriesElement
 from discover.inference.engine.closed_forms import integrated_rate
 from discover.inference.engine.rows import Rows
@@ -32,8 +33,9 @@ class Variable:
 
     `slot`, `name`, `unit`: of the function, as the contract names it: ``recorded_stress``,
     ``rate``, ``drift`` or ``network``. `values`: at each row; None for the stress, which is that of
-    the fluid as predicted. `largest`: in the fitted runs. `is_factor`: whether the stress is
-    multiplied.
+    the fluid as predicted. `largest`: in the fitted runs. `scale`: root mean square of the fitted
+    records in Pa, in which a function is told that is no factor. `is_factor`: whether the stress
+    is multiplied.
     """
 
     slot: str
@@ -41,7 +43,11 @@ class Variable:
     unit: str
     values: Float[np.ndarray, " rows"] | None
     largest: float
+    scale: float
     is_factor: bool = False
+
+    count: ClassVar[int] = KNOTS
+    """Of changes of slope, or of what else a function is a sum of."""
 
     @property
     def is_odd(self) -> bool:
@@ -60,24 +66,27 @@ class Variable:
         low = 0.0 if self.is_odd else float(np.min(along))
         return np.linspace(low, float(np.max(along)), points)
 
-    def columns(self, predicted: Float[np.ndarray, " rows"], size: Float[np.ndarray, " rows"]):
+    def at(self, rows: Rows) -> "Variable":
+        """Return the same variable, in its own scales, at other rows."""
+        return self if self.values is None else replace(self, values=_VALUES[self.slot](rows))
+
+    def columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows knots"]:
         """Return what one of each does to the records, in Pa."""
         along = predicted if self.values is None else self.values
-        scale = predicted if self.is_factor else np.sqrt(np.mean(size**2))
+        scale = predicted if self.is_factor else self.scale
         return self.basis(along) * np.broadcast_to(scale, predicted.shape)[:, None]
 
     def change(
         self,
         slopes: Float[np.ndarray, "rows m"],
         predicted: Float[np.ndarray, " rows"],
-        size: Float[np.ndarray, " rows"],
         sizes: Float[np.ndarray, " knots"],
     ) -> Float[np.ndarray, "rows m"]:
         """Return what becomes of derivatives of the stress, behind those of the stress itself."""
         if self.values is not None and not self.is_factor:
             return np.zeros_like(slopes)
         step = 1e-6
-        moved = self.columns(predicted * (1.0 + step), size) - self.columns(predicted, size)
+        moved = self.columns(predicted * (1.0 + step)) - self.columns(predicted)
         change = moved @ sizes / np.where(predicted == 0.0, np.inf, step * predicted)
         return change[:, None] * slopes
 
@@ -100,10 +109,14 @@ class Response(Variable):
     root: Float[np.ndarray, "lags knots"] = None  # type: ignore[assignment]
 
     @classmethod
-    def of(cls, rows: Rows) -> "Response":
-        """Return the response over some samples, of runs that begin at rest."""
+    def of(cls, rows: Rows, step: float | None = None) -> "Response":
+        """Return the response over some samples, of runs that begin at rest.
+
+        `step`: between lags, in s; by default the usual one between samples.
+        """
         times = [np.asarray(run.time) / run.clock_factor for run in rows.runs]
-        step = float(np.median(np.concatenate([np.diff(own) for own in times])))
+        if step is None:
+            step = float(np.median(np.concatenate([np.diff(own) for own in times])))
         lags = step * np.arange(1, _LAGS + 1)
         before, after, share, first = [], [], [], 0
         for own in times:
@@ -120,9 +133,13 @@ class Response(Variable):
         values, directions = np.linalg.eigh(decay)
         root = (directions * np.sqrt(np.maximum(values, 0.0)))[:, : -KNOTS - 1 : -1]
         return cls(
-            "response", "time before", "s", None, float(lags[-1]), True,
+            "response", "time before", "s", None, float(lags[-1]), 1.0, True,
             np.concatenate(before), np.concatenate(after), np.concatenate(share), root,
         )  # fmt: skip
+
+    def at(self, rows: Rows) -> "Response":
+        """Return the same response at other rows."""
+        return Response.of(rows, self.largest / _LAGS)
 
     def basis(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n knots"]:
         """Return the weight of lags in s, over a second, of one of each coefficient."""
@@ -140,36 +157,80 @@ class Response(Variable):
         earlier = np.where(self.before[..., None] < 0, 0.0, values[self.before])
         return earlier * (1.0 - share) + values[self.after] * share - values[:, None]
 
-    def columns(self, predicted: Float[np.ndarray, " rows"], size: Float[np.ndarray, " rows"]):
+    def columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows knots"]:
         """Return what one of each does to the records, in Pa."""
-        del size
         return self._lagged(predicted[:, None])[..., 0] @ self.root
 
-    def change(self, slopes, predicted, size, sizes):
+    def change(self, slopes, predicted, sizes):
         """Return what becomes of derivatives of the stress, behind those of the stress itself."""
-        del predicted, size
+        del predicted
         return np.einsum("rlm,l->rm", self._lagged(slopes), self.root @ sizes)
+
+
+@dataclass(frozen=True)
+class ClosedForm(Variable):
+    """A function of known form: so much of it, and its inner constant to first order.
+
+    `form`, `inner`: one of `closed_forms`, and its inner constant over the largest value.
+    """
+
+    form: str = ""
+    inner: float = 1.0
+    count: ClassVar[int] = 2
+
+    @classmethod
+    def of(cls, variable: Variable, form: str, inner: float) -> "ClosedForm":
+        """Return a form of what a variable is."""
+        return cls(**vars(variable), form=form, inner=inner)
+
+    def basis(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
+        """Return how much one of the form is, and what a change of its inner constant does."""
+        x, step = np.abs(values) / self.largest, 1e-4
+        here, low, high = (
+            closed_forms(self.slot, x, self.inner + off)[self.form] for off in (0.0, -step, step)
+        )
+        found = np.column_stack([here, (high - low) / (2.0 * step)])
+        return found * np.sign(values)[:, None] if self.is_odd else found
+
+    def moved(self, sizes: Float[np.ndarray, " 2"]) -> "ClosedForm":
+        """Return the form with the inner constant that sizes tell of."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inner = self.inner + np.nan_to_num(sizes[1] / sizes[0], posinf=0.0, neginf=0.0)
+        return replace(self, inner=float(np.clip(inner, *INNER)))
+
+
+def _of_runs(of: Callable[[Run], np.ndarray]) -> Callable[[Rows], np.ndarray]:
+    return lambda rows: np.concatenate([np.asarray(of(run), float) for run in rows.runs])
+
+
+_VALUES = {
+    "rate": _of_runs(lambda run: run.rate),
+    "drift": _of_runs(lambda run: run.time),
+    "network": _of_runs(integrated_rate),
+}
+"""What is known of each row, by slot."""
 
 
 def variables(rows: Rows) -> Iterator[Variable]:
     """Return what a function of runs in shear may depend on."""
-    runs = rows.runs
+    runs, scale = rows.runs, float(np.sqrt(np.mean(rows.size**2)))
 
-    def of(slot: str, name: str, unit: str, values, is_factor: bool = False) -> Variable:
-        return Variable(slot, name, unit, values, float(np.max(np.abs(values))), is_factor)
+    def of(slot: str, name: str, unit: str, is_factor: bool = False) -> Variable:
+        values = _VALUES[slot](rows)
+        return Variable(slot, name, unit, values, float(np.max(np.abs(values))), scale, is_factor)
 
     largest = float(np.max(np.abs(rows.recorded)))
-    yield Variable("recorded_stress", "stress", "Pa", None, largest)
-    rates, times, strains = (
-        np.concatenate([one(run) for run in runs])
-        for one in (lambda r: np.asarray(r.rate), lambda r: np.asarray(r.time), integrated_rate)
-    )
-    if len(np.unique(np.abs(rates))) > KNOTS:
-        yield of("rate", "shear rate", "1/s", rates)
-    yield of("drift", "time", "s", times)
-    yield of("network", "strain", "", strains, True)
+    yield Variable("recorded_stress", "stress", "Pa", None, largest, scale)
+    if len(np.unique(np.abs(_VALUES["rate"](rows)))) > KNOTS:
+        yield of("rate", "shear rate", "1/s")
+    yield of("drift", "time", "s")
+    yield of("network", "strain", "", is_factor=True)
     if len(rows) > len(runs) and all(float(run.protocol.begins) == 0.0 for run in runs):
         yield Response.of(rows)
+
+
+INNER = (0.02, 1.2)
+"""Range of the inner constant of a closed form, over the largest value."""
 
 
 def closed_forms(slot: str, x: Float[np.ndarray, " n"], inner: float) -> dict[str, np.ndarray]:
