@@ -118,13 +118,30 @@ def test_a_transducer_that_saturates_is_told_as_a_function_of_the_stress(tmp_pat
     found = [one for one in free_functions(posterior) if one.is_shown]
     assert [one.form.slot for one in found] == ["recorded_stress"]
     (curve,) = found
-    assert posterior.with_something_else(curve.log_odds).verdict == "unexplained"
+    assert posterior.with_curves([curve]).verdict == "unexplained"
     assert "ptt_exponential" in curve.form.beside
     assert curve.form.nearest == "clipped"
     # beyond its limit a clipped record lacks what the stress exceeds it by, and below it nothing
     limit = max(np.max(np.abs(run.stress)) for run in world.make(None).values())
     lacking = -np.maximum(curve.form.grid - limit, 0.0)
     assert np.max(np.abs(curve.form.value - lacking)) < 0.1 * limit
+    # the law beside it is that of the fluid: its constant lies in an interval of a tenth or less
+    (law, _), *_ = curve.fits
+    (at,) = posterior.problem.model.positions("ptt_exponential")
+    low, high = law.interval(at)
+    truth = world.constants["ptt_exponential"]["epsilon"]
+    assert law.names == ("ptt_exponential",)
+    assert low < truth < high < 1.1 * low
+
+
+def test_runs_behind_a_transducer_that_saturates_are_predicted_to_a_tenth(tmp_path):
+    posterior, problem, _ = ask(tmp_path, *CLIPPED, FEW)
+    _, blind = inside(posterior, problem)
+    share, width = inside(posterior.with_curves(free_functions(posterior)), problem)
+    typical = np.sqrt(np.mean(problem.predicted.recorded**2))
+    # as above; laws alone have whole bands of half the record or more
+    assert share > 0.9
+    assert width < 0.2 * typical < 0.4 * blind
 
 
 @pytest.mark.slow
@@ -140,7 +157,7 @@ def test_a_transducer_that_bends_by_three_per_cent_is_weighed_by_the_runs_held_o
     best = max(free_functions(posterior), key=lambda one: one.log_odds_in_all)
     assert (best.form.slot, best.form.beside) == ("recorded_stress", ("giesekus_mobility",))
     assert best.log_odds_in_all > best.log_odds  # held-out runs reach further
-    assert posterior.with_something_else(best.log_odds_in_all).verdict == "unexplained"
+    assert posterior.with_curves([best]).verdict == "unexplained"
 
 
 def of_instrument(folder, instrument, effects):

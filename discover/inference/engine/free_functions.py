@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.linear_errors import LinearErrors
-from discover.inference.engine.posterior import TOLD, WINDOW, Posterior
+from discover.inference.engine.posterior import LOG_ODDS_OF_NONE, NEAR, TOLD, WINDOW, Posterior
 from discover.inference.engine.priors import Deviations, Prior
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.search import Search
@@ -64,6 +64,7 @@ _WORTH_IT = -20.0
 _POINTS = 61
 _TRIED = 60
 _LAWS = 4  # With which a function of closed form is fitted
+_FAINT = 0.5  # Of the width of a prior, the deviation from which on nothing is told
 _SETTLED = 4  # Rounds after which an inner constant stands still
 _USUAL = 0.95
 _RESOLVED = 0.05
@@ -97,7 +98,7 @@ class FreeFunction:
     `fits`: hypotheses beside which it is possible, fitted with it, with weights that add up to one,
     the likeliest first. `fitter`: what fitted them. `log_odds`: against all that has a name, and
     any discrepancy of another kind, by the fitted runs. `log_odds_in_all`: the same by all runs, as
-    explanations are weighed.
+    explanations are weighed. `log_odds_of_all`: that there is nothing else beside the likeliest.
     """
 
     form: FreeForm
@@ -105,11 +106,17 @@ class FreeFunction:
     fitter: "WithFunction | WithSlip"
     log_odds: float
     log_odds_in_all: float
+    log_odds_of_all: float
 
     @property
     def is_shown(self) -> bool:
         """Whether it stands out so far that the runs have a curve of this shape."""
         return self.log_odds > TOLD
+
+    @property
+    def reliance(self) -> float:
+        """Log odds by which laws beside it predict what was not fitted, and no others."""
+        return min(self.log_odds - TOLD, self.log_odds_of_all)
 
     @property
     def weight(self) -> float:
@@ -201,19 +208,25 @@ class WithFunction(Fitter):
         """
         variable, best = self.variable, fits[0]
         assert best.covariance is not None
-        x = np.linspace(0.0, variable.largest, KNOTS + 1)[1:]
         sizes, covariance = best.linear[-KNOTS:], best.covariance[-KNOTS:, -KNOTS:]
+        x = variable.grid(best.predicted, KNOTS + 1)[1:]
         _, (form, inner, amount) = _nearest(variable, x, variable.basis(x), sizes, covariance)
-        closed, found = ClosedForm.of(variable, form, inner), list(fits)
-        start, fitter, q = np.array([amount, 0.0]), self, len(self.bare.errors)
+        closed, start = ClosedForm.of(variable, form, inner), np.array([amount, 0.0])
+        fitter, found, q = self, list(fits), len(self.bare.errors)
         for _ in range(_SETTLED):
-            fitter = WithFunction(self.bare, closed, _WIDTHS[-1])
-            found = fitter.fit([
-                fitter.start(fit.names, fit.theta, np.append(fit.linear[:q], start))
-                for fit in found
+            last = WithFunction(self.bare, closed, _WIDTHS[-1])
+            fits = last.fit([
+                last.start(fit.names, fit.theta, np.append(fit.linear[:q], start)) for fit in found
             ])  # fmt: skip
-            closed, start = closed.moved(found[0].linear[-2:]), found[0].linear[-2:] * [1.0, 0.0]
-        return fitter, found
+            if fitter is not self and fits[0].log_evidence < found[0].log_evidence:
+                break
+            fitter, found = last, fits
+            closed, start = closed.moved(fits[0].linear[-2:]), fits[0].linear[-2:] * [1.0, 0.0]
+        return fitter, [fit for fit in found if fitter.is_seen(fit)]
+
+    def is_seen(self, fit: Fit) -> bool:
+        """Return whether records tell how much there is of a closed form."""
+        return fit.root is not None and bool(np.linalg.norm(fit.root[-2]) < _FAINT * self.width)
 
 
 class WithSlip(Fitter):
@@ -325,17 +338,25 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
         weighed = _weighed(curves, rank_of)
         if isinstance(fitter, WithFunction) and not isinstance(fitter.variable, Response):
             closed, known = fitter.closed([one for one, _ in weighed[:_LAWS]])
-            if max(map(rank_of, known)) > rank_of(fit):
+            if max(map(rank_of, known), default=-np.inf) > rank_of(fit):
                 fitter, weighed = closed, _weighed(known, rank_of)
         rank = rank_of(weighed[0][0])
         odds += rank - in_all
         if max(rank - other, odds) > _POSSIBLE:
             variable, (grid, value, half), nearest = reported.curve(fit)
+            # a function may take up what an effect does, or an effect what it does
+            likely = [one.names for one, _ in weighed if rank_of(one) > rank - NEAR]
+            beside = min((one for one in likely if set(one) <= set(likely[0])), key=len)
             form = FreeForm(
-                variable.slot, variable.name, variable.unit, fit.names,
+                variable.slot, variable.name, variable.unit, beside,
                 grid, value, value - half, value + half, nearest,
             )  # fmt: skip
-            found.append(FreeFunction(form, weighed, fitter, float(rank - other), float(odds)))
+            of_all = -np.inf
+            if rank > other:
+                rest = Discrepancy(fitter, weighed[0][0]).log_factor
+                of_all = -rest - LOG_ODDS_OF_NONE
+            log_odds = [float(one) for one in (rank - other, odds, of_all)]
+            found.append(FreeFunction(form, weighed, fitter, *log_odds))
     return sorted(found, key=lambda one: -one.log_odds)
 
 

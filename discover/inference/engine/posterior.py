@@ -52,7 +52,9 @@ SAME = 0.3
 """Root mean square of a difference of predictions over the noise, below which no test of these
 runs can tell two hypotheses apart."""
 
-_NEAR = 6.0
+NEAR = 6.0
+"""Log odds behind the likeliest up to which a set that predicts the same is as good."""
+
 _AS_LIKELY = 1.0
 """Log odds that are not worth more than a bare mention   [Kass & Raftery 1995, JASA 90, 773]."""
 
@@ -143,9 +145,9 @@ class Posterior:
         """Return laws for where none is all there is, and those with a function beside them.
 
         These count by the fitted runs, as far as they stand out beyond functions that only stand
-        for an unknown law. `laws`: with weights that add up to one.
+        for an unknown law, and leave nothing. `laws`: with weights that add up to one.
         """
-        odds = [curve.log_odds - TOLD for curve in self.curves]
+        odds = [curve.reliance for curve in self.curves]
         law, *of_curves = np.exp(np.array([0.0, *odds]) - np.logaddexp.reduce([0.0, *odds]))
         found = [(fit, float(law * weight)) for fit, weight in laws]
         for curve, weight in zip(self.curves, of_curves, strict=True):
@@ -367,7 +369,7 @@ def _classes(
         record, rank = fitter.record(fit), search.rank(fit)
         for one in classes:
             off = (record - one["record"]) / (one["noise"] * fitter.rows.size)
-            if np.sqrt(np.mean(off**2)) < SAME and rank > one["rank"] - _NEAR:
+            if np.sqrt(np.mean(off**2)) < SAME and rank > one["rank"] - NEAR:
                 one["members"].append((fit.names, rank))
                 one["p"] += p
                 break
