@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from markupsafe import Markup, escape
 
@@ -122,10 +122,22 @@ _WHAT = {
 }
 
 
+def _with_constants(found: FreeForm) -> Callable[[str], str]:
+    def told(effect: str) -> str:
+        values = [
+            f"{words.readable(name)} = {words.estimate(value, ends)}, "
+            f"{words.LEVEL} {words.interval(ends)}"
+            for name, (value, *ends) in found.constants[effect].items()
+        ]
+        return f"{words.effect_title(effect)} ({', '.join(values)})"
+
+    return told
+
+
 def free_form_sentence(found: FreeForm) -> str:
     """Return what a free function is and where it stands, without a full stop."""
-    effects = " and ".join(map(words.effect_title, found.beside)) or "your model"
-    shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
+    effects = " and ".join(map(_with_constants(found), found.beside)) or "your model"
+    shape = f", close to the {found.nearest} form" if found.nearest else ", close to no known form"
     what = _WHAT[found.slot].format(variable=found.variable)
     return f"{what}{shape}, with {effects} explains the residual"
 

@@ -15,12 +15,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.linear_errors import LinearErrors
 from discover.inference.engine.posterior import LOG_ODDS_OF_NONE, NEAR, TOLD, WINDOW, Posterior
 from discover.inference.engine.priors import Deviations, Prior
-from discover.inference.engine.problem import TERM_ODDS
+from discover.inference.engine.problem import TERM_ODDS, Problem
 from discover.inference.engine.search import Search
 from discover.inference.engine.variables import (
     INNER,
@@ -77,7 +78,8 @@ class FreeForm:
     `slot`: where it acts, such as ``relaxation`` or ``slip``. `variable`, `unit`: of what it is a
     function, and its unit. `beside`: effects in the model with it. `grid`, `value`, `low95`,
     `high95`: the curve with its 95 % band, shape (n,), in Pa or as a relative change. `nearest`: a
-    closed form that is it within its uncertainty; None if none of those tried is.
+    closed form that is it within its uncertainty; None if none of those tried is. `constants`: of
+    what is beside it, each with the ends of its 95 % interval, by effect and name.
     """
 
     slot: str
@@ -89,6 +91,7 @@ class FreeForm:
     low95: Float[np.ndarray, " n"]
     high95: Float[np.ndarray, " n"]
     nearest: str | None
+    constants: Mapping[str, Mapping[str, tuple[float, float, float]]]
 
 
 @dataclass(frozen=True)
@@ -309,6 +312,10 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
         [fit for fit in fits if len(fit.names) == size][:_BASES]
         for size in range(_LARGEST_BASE + 1)
     ]
+    # effects by name that the search passed over, for beside a function others are likely
+    known = {fit.names for fit in bases[1]}
+    named = [effect.name for effect in problem.candidates if not isinstance(effect, LibraryTerm)]
+    single = [search.fitter.start((name,), problem.zero) for name in named if (name,) not in known]
     whole, _, discrepancies = posterior.memory["whole"]
     other, in_all = _likeliest(search, [left]), _likeliest(whole, discrepancies)
     prior, found = problem.log_odds_of(TERM_ODDS), []
@@ -330,6 +337,8 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
             continue
         starts = [fitter.beside(base, fit) for base in chain(*bases)]
         curves = [fit, *fitter.fit(starts, wanted=1, known=[fit])]
+        if max(map(rank_of, curves)) > other:  # of which those that start far away are worth it
+            curves += fitter.fit([fitter.beside(base, fit) for base in single])
         fit, reported = max(curves, key=rank_of), fitter
         odds, again = -np.inf, fitter.on(whole.fitter)
         if again is not None:
@@ -347,9 +356,10 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
             # a function may take up what an effect does, or an effect what it does
             likely = [one.names for one, _ in weighed if rank_of(one) > rank - NEAR]
             beside = min((one for one in likely if set(one) <= set(likely[0])), key=len)
+            law = next(one for one, _ in weighed if one.names == beside)
             form = FreeForm(
                 variable.slot, variable.name, variable.unit, beside,
-                grid, value, value - half, value + half, nearest,
+                grid, value, value - half, value + half, nearest, _constants(problem, law),
             )  # fmt: skip
             of_all = -np.inf
             if rank > other:
@@ -358,6 +368,20 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
             log_odds = [float(one) for one in (rank - other, odds, of_all)]
             found.append(FreeFunction(form, weighed, fitter, *log_odds))
     return sorted(found, key=lambda one: -one.log_odds)
+
+
+def _constants(problem: Problem, fit: Fit) -> dict[str, dict[str, tuple[float, float, float]]]:
+    """Return the free constants of effects with the ends of their intervals, by name."""
+    return {
+        name: {
+            one.name: (float(fit.theta[at]), *fit.interval(at))
+            for one, at in zip(
+                problem.effects[name].parameters, problem.model.positions(name), strict=True
+            )
+            if at in fit.priors
+        }
+        for name in fit.names
+    }
 
 
 def _weighed(fits: Sequence[Fit], rank_of: Callable[[Fit], float]) -> tuple[tuple[Fit, float], ...]:
