@@ -13,11 +13,11 @@ from discover.forward import AugmentedModel, make_batch
 from discover.forward.of_fluids import bare_run
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fit import Fit
-from discover.inference.engine.free_functions import WithFunction
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows, transducer_of
 from discover.inference.engine.variables import SLIP_CURVE, Variable
+from discover.inference.engine.with_function import WithFunction
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import misfit, weighed_laws
 from discover.loop.loop import Found

@@ -32,11 +32,6 @@ LOG_ODDS_OF_NONE = float(np.log(NONE / (1.0 - NONE)))
 WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
 
-TOLD = 15.0
-"""Log odds of a function of one variable against all that has a name and any other discrepancy,
-from which on it is told. On development seeds one that is there has 35 and more; one that stands
-for a law of no dictionary, up to 10."""
-
 UNLIKE_NOISE = 0.02
 """Prior probability of a smooth misfit of another kind than the curves: of one that noise has once
 in a thousand times it makes even odds."""
