@@ -22,7 +22,7 @@ from discover.linear_algebra_threads import in_one_thread
 from discover.loop.from_posterior import Ended, result_of
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Fold
-from discover.loop.preference import with_named_law_first
+from discover.loop.preference import with_function_first, with_named_law_first
 from discover.loop.runs import MOST_SAMPLES
 from discover.loop.search_time import SearchTime
 from discover.loop.simple import simple_result
@@ -216,12 +216,17 @@ class Found:
 
     @cached_property
     def _reported(self) -> Posterior:
-        return with_named_law_first(self.posterior)
+        first = with_function_first(self.posterior)
+        return first if first is not self.posterior else with_named_law_first(first)
 
     def ended(self, explanations: int = MOST_LISTED) -> Ended:
         """Return what is reported of the posterior, with so many explanations at most."""
         posterior = self._reported
-        return Ended(posterior, without_fluid(posterior), explanations, self.curves)
+        ahead = [one.form for one in posterior.curves if one.fits is posterior.by_left_out]
+        curves = [
+            replace(form, in_answer=any(form is one for one in ahead)) for form in self.curves
+        ]
+        return Ended(posterior, without_fluid(posterior), explanations, curves)
 
     def result(self, explanations: int = MOST_LISTED) -> LoopResult:
         """Return the result of a closed loop."""

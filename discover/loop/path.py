@@ -21,16 +21,16 @@ from discover.loop.runs import RunRecord, record_runs
 _NEGLIGIBLE = 1e-4  # Probability below which an explanation is not listed
 
 
-def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
+def predicted(fitter: Fitter, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
     """Return what a hypothesis predicts of runs, with what the bench does.
 
     Of runs that no fit saw, with what all runs share: zero, drift and loading are of each run.
     """
-    problem, linear, fitter = search.problem, fit.linear, search.fitter
+    problem, linear = fitter.problem, fit.linear
     with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may diverge
         found = problem.model.predictions([fit.theta], rows.batch)[0]
     if held_out:
-        fitted, fitter = fitter.errors.of_runs, Fitter(problem, rows)
+        fitted, fitter = fitter.errors.of_runs, fitter.at(Fitter(problem, rows))
         ahead = np.zeros(len(fitter.errors))
         of_transducers = fitter.errors.of_transducers
         ahead[of_transducers] = linear[of_transducers]
@@ -47,7 +47,7 @@ def records_of(search: Search, fit: Fit) -> list[RunRecord]:
     problem, found = search.problem, []
     for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
         if rows is not None:
-            own = predicted(search, fit, rows, held_out)[None]
+            own = predicted(search.fitter, fit, rows, held_out)[None]
             found += record_runs(rows.runs, own, held_out)
     return found
 
@@ -78,6 +78,8 @@ class Path:
         if self.without_fluid or not told:
             return self.fitted(())
         # where none of them is all there is, the one that predicts best
+        if best and self.posterior.has_function(best[0][0]):
+            return best[0][0]
         names = best[0][0].names if best and self.verdict == "unexplained" else told[0].members[0]
         found = self.fitted(names)
         while idle := self._idle(found):
@@ -145,7 +147,8 @@ class Path:
     def predicted(self, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
         """Return what a hypothesis predicts of runs, held out or fitted."""
         theta = self.theta_ahead(fit) if held_out else fit.theta
-        return predicted(self.posterior.search, replace(fit, theta=theta), rows, held_out)
+        fitter = self.posterior.fitter_of(fit)
+        return predicted(fitter, replace(fit, theta=theta), rows, held_out)
 
     def declared_predicted(self, rows: Rows) -> Float[np.ndarray, "runs n"]:
         """Return what the declared model predicts, its constants as fitted and the bench ideal."""
@@ -169,7 +172,8 @@ class Path:
         for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
             if rows is None:
                 continue
-            stages = [self.predicted(fit, rows, held_out) for fit in self.path[1:]]
+            steps = [*self.path[1:-1], self.fit] if self.fit.names else []
+            stages = [self.predicted(fit, rows, held_out) for fit in steps]
             models = np.stack([self.declared_predicted(rows), *stages])
             records = record_runs(rows.runs, models, held_out)
             each = [self.predicted(fit, rows, held_out) for fit in fits]
@@ -189,7 +193,7 @@ class Path:
         fitter = self.posterior.search.fitter
         weights, middles, variances = [], [], []
         for fit, weight in self.posterior.relied_on or ((self.fit, 1.0),):
-            record = fitter.record(fit)
+            record = self.posterior.fitter_of(fit).record(fit)
             assert fit.jacobian is not None
             assert fit.covariance is not None
             noise = fit.noise.sizes[fitter.rows.run] * fitter.noise.deviation(

@@ -81,6 +81,18 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     )
 
 
+def with_function_first(posterior: Posterior) -> Posterior:
+    """Return the posterior with laws ahead that a function of the measurement makes the likeliest.
+
+    Of a function of the fluid the law alone is none that one can use.
+    """
+    ahead = (one for one in posterior.curves if one.is_of_record and one.reliance > 0.0)
+    curve = next(ahead, None)
+    if posterior.verdict != "unexplained" or curve is None or not curve.fits[0][0].names:
+        return posterior
+    return replace(posterior, left=curve.left, by_left_out=curve.fits)
+
+
 def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
     """Return a hypothesis whose fluid is a law of the field, with intervals by its own fit.
 

@@ -57,7 +57,8 @@ class FreeForm:
     function, and its unit. `beside`: effects in the model with it. `grid`, `value`, `low95`,
     `high95`: the curve with its 95 % band, shape (n,), in Pa or as a relative change. `nearest`: a
     closed form that is it within its uncertainty; None if none of those tried is. `constants`: of
-    what is beside it, each with the ends of its 95 % interval, by effect and name.
+    what is beside it, each with the ends of its 95 % interval, by effect and name. `in_answer`:
+    whether what is beside it is the answer's law.
     """
 
     slot: str
@@ -70,6 +71,7 @@ class FreeForm:
     high95: Float[np.ndarray, " n"]
     nearest: str | None
     constants: Mapping[str, Mapping[str, tuple[float, float, float]]]
+    in_answer: bool = False
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class FreeFunction:
     `fits`: hypotheses beside which it is possible, fitted with it, with weights that add up to one,
     the likeliest first. `fitter`: what fitted them. `log_odds`: against all that has a name, and
     any discrepancy of another kind, by the fitted runs. `log_odds_in_all`: the same by all runs, as
-    explanations are weighed. `log_odds_of_all`: that there is nothing else beside the likeliest.
+    explanations are weighed. `left`: what the likeliest leaves; None where it is not asked.
     """
 
     form: FreeForm
@@ -87,7 +89,7 @@ class FreeFunction:
     fitter: "WithFunction | WithSlip"
     log_odds: float
     log_odds_in_all: float
-    log_odds_of_all: float
+    left: Discrepancy | None
 
     @property
     def is_shown(self) -> bool:
@@ -97,7 +99,14 @@ class FreeFunction:
     @property
     def reliance(self) -> float:
         """Log odds by which laws beside it predict what was not fitted, and no others."""
-        return min(self.log_odds - _TOLD, self.log_odds_of_all)
+        if self.left is None:
+            return -np.inf
+        return min(self.log_odds - _TOLD, -self.left.log_factor - LOG_ODDS_OF_NONE)
+
+    @property
+    def is_of_record(self) -> bool:
+        """Whether it is of the measurement rather than the fluid, as far as its variable tells."""
+        return self.form.slot in ("recorded_stress", "drift", "response", "slip")
 
     @property
     def weight(self) -> float:
@@ -173,12 +182,9 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
                 variable.slot, variable.name, variable.unit, beside,
                 grid, value, value - half, value + half, nearest, _constants(problem, law),
             )  # fmt: skip
-            of_all = -np.inf
-            if rank > other:
-                rest = Discrepancy(fitter, weighed[0][0]).log_factor
-                of_all = -rest - LOG_ODDS_OF_NONE
-            log_odds = [float(one) for one in (rank - other, odds, of_all)]
-            found.append(FreeFunction(form, weighed, fitter, *log_odds))
+            left = Discrepancy(fitter, weighed[0][0]) if rank > other else None
+            log_odds = float(rank - other), float(odds)
+            found.append(FreeFunction(form, weighed, fitter, *log_odds, left))
     return sorted(found, key=lambda one: -one.log_odds)
 
 

@@ -156,6 +156,10 @@ class Posterior:
                 return curve.fitter
         return self.search.fitter
 
+    def has_function(self, fit: Fit) -> bool:
+        """Return whether a hypothesis has a function beside it."""
+        return self.fitter_of(fit) is not self.search.fitter
+
     def interval(self, position: int) -> tuple[float, float] | None:
         """Return the 95 % interval of a constant, over the hypotheses in which it is free."""
         parts = []
