@@ -86,7 +86,10 @@ def loop_answer(result: Any) -> Answer:
         range_of(result.records, equation),
         by_quantity.errors_by_quantity(result),
         following,
-        tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
+        (
+            *(Suspect(one.title) for one in result.free_form if one.in_answer),
+            *(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
+        ),
         failed=_failed(result),
         alternative=_alternative(result),
         best_classical=_best_classical(result),

@@ -77,6 +77,8 @@ def what_to_measure_next(result: Any) -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
+        if told := next((_CHECKS[one.slot] for one in result.free_form if one.in_answer), ""):
+            return told
         if own := suspected(result):  # of the instrument
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
         return _of_another_stress(result) or _by_geometry(result)
@@ -92,6 +94,14 @@ def what_to_measure_next(result: Any) -> str:
         return f"To confirm {title}, {check}."
     others = several([*map(words.effect_title, doubtful.aliases)])
     return f"To distinguish {title} from {others}, {check}."
+
+
+_CHECKS = {
+    "recorded_stress": "Repeat the run of the largest stress with a smaller plate or cone.",
+    "drift": "Record the stress before the flow starts and after it ends.",
+    "response": "Repeat the fastest run at a tenth of its rate.",
+    "slip": "Repeat the run of the largest stress with another gap.",
+}
 
 
 def _of_sweep(result: Any) -> str:

@@ -28,6 +28,7 @@ def path_of(verdict, likelihoods, chosen, at_an_end=()):
             explanations=told,
             by_left_out=[(found[frozenset(chosen)], 1.0)],
             verdict=verdict,
+            has_function=lambda fit: False,
             search=SimpleNamespace(found=found),
             problem=SimpleNamespace(
                 effects={n: SimpleNamespace(parameters=range(k)) for n, k in SIZES.items()}

@@ -49,6 +49,15 @@ _LAWS = 4
 """Beside which a function of closed form is fitted."""
 
 
+_TITLES = {
+    "recorded_stress": "nonlinear_transducer",
+    "drift": "zero_that_drifts",
+    "response": "slow_transducer",
+    "slip": "nonlinear_wall_slip",
+}
+"""Functions of the measurement, by slot."""
+
+
 @dataclass(frozen=True)
 class FreeForm:
     """A smooth function of one variable that explains what named effects leave.
@@ -72,6 +81,11 @@ class FreeForm:
     nearest: str | None
     constants: Mapping[str, Mapping[str, tuple[float, float, float]]]
     in_answer: bool = False
+
+    @property
+    def title(self) -> str:
+        """What of the measurement has such a function, as an effect is spelled."""
+        return _TITLES[self.slot]
 
 
 @dataclass(frozen=True)
@@ -106,7 +120,7 @@ class FreeFunction:
     @property
     def is_of_record(self) -> bool:
         """Whether it is of the measurement rather than the fluid, as far as its variable tells."""
-        return self.form.slot in ("recorded_stress", "drift", "response", "slip")
+        return self.form.slot in _TITLES
 
     @property
     def weight(self) -> float:

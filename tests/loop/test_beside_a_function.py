@@ -1,0 +1,82 @@
+"""A law behind a transducer that has no name: linear PTT by scipy, clipped or not."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import solve_ivp
+
+import discover as dc
+
+MODULUS, TIME, EPSILON = 60.0, 1.3, 0.25
+RATES = {"a": 0.7, "b": 1.5, "c": 3.0, "d": 4.5}
+CANDIDATES = ["ptt_linear", "giesekus_mobility", "stress_gain", "stress_offset"]
+
+
+def start_up(rate, times):
+    """Return the shear stress of linear PTT   [Phan-Thien & Tanner 1977, JNNFM 2, 353]."""
+
+    def change(_, stress):
+        normal, shear = stress
+        faster = (1.0 + EPSILON * normal / MODULUS) / TIME
+        return [2.0 * rate * shear - faster * normal, MODULUS * rate - faster * shear]
+
+    found = solve_ivp(change, (0.0, times[-1]), [0.0, 0.0], t_eval=times, rtol=1e-9, atol=1e-9)
+    return found.y[1]
+
+
+def loop_of(limit):
+    """Return the loop on runs whose transducer shows a limit, over the largest stress, at most."""
+    times, lot = np.linspace(0.05, 6.0, 80), np.random.default_rng(7)
+    stress = {name: start_up(rate, times) for name, rate in RATES.items()}
+    largest = limit * np.max(stress["c"])
+    tables = []
+    for name, values in stress.items():
+        noise = 1.0 + 0.01 * lot.standard_normal(len(times))
+        shown = np.clip(values, -largest, largest) * noise
+        columns = {"time_s": times, "shear_rate_1_s": RATES[name], "stress_Pa": shown}
+        tables.append(pd.DataFrame(columns).assign(run=name))
+    data = dc.from_dataframe(pd.concat(tables))
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    return dc.close_loop(data, base, held_out=["d"], effects=CANDIDATES)
+
+
+@pytest.fixture(scope="module")
+def clipped():
+    return loop_of(0.6)
+
+
+def test_the_law_behind_a_transducer_that_saturates_is_the_answers_law(clipped):
+    assert clipped.verdict == "unexplained"  # what bends has no name
+    (constant,) = clipped.answer.constants
+    low, high = constant.ci95
+    assert clipped.answer.law == "ptt_linear"
+    # the half of each record that the clip leaves tells it to a sixth
+    assert low < EPSILON < high
+    assert high - low < EPSILON / 3.0
+
+
+def test_what_saturates_is_suspected_and_how_to_see_it_comes_next(clipped):
+    (function,) = clipped.free_form
+    assert (function.slot, function.nearest, function.in_answer) == (
+        "recorded_stress",
+        "clipped",
+        True,
+    )
+    assert [one.text for one in clipped.answer.suspects] == ["nonlinear transducer"]
+    assert "smaller plate or cone" in clipped.answer.next_test
+    assert clipped.to_json()["free_form"][0]["constants"]["ptt_linear"]["epsilon"]
+
+
+def test_a_run_that_no_fit_saw_is_predicted_as_the_transducer_shows_it(clipped):
+    (record,) = (one for one in clipped.records if one.held_out)
+    low, high = record.band
+    # 95 % of 80 samples, three standard errors below
+    assert np.mean((low <= record.measured) & (record.measured <= high)) > 0.87
+    assert clipped.error_after.held_out < 0.02  # twice its noise
+
+
+def test_a_transducer_that_saturates_nowhere_is_not_suspected():
+    sound = loop_of(10.0)
+    assert sound.verdict == "effects_added"
+    assert not sound.free_form
+    assert not sound.answer.suspects
