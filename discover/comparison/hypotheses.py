@@ -110,10 +110,7 @@ def with_proposals(
             starts.append(search.fitter.start(names, theta, best.linear))
     search.add(starts)
     if any(np.isfinite(search.found[frozenset(s.names)].log_evidence) for s in starts):
-        memory = found.posterior.memory.get("by_mode")
         found = replace(found, posterior=posterior_of(search, found.posterior))
-        if memory is not None:
-            found.posterior.memory["by_mode"] = memory
     shares = {frozenset(fit.names): share for fit, share in found.posterior.fits}
     proposed = {}
     for learner, some in terms.items():

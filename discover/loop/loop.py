@@ -17,6 +17,7 @@ from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.free_functions import FreeForm, free_functions
+from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.search import Search
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.from_posterior import Ended, result_of
@@ -208,11 +209,18 @@ class Found:
     def with_curves(self) -> "Found":
         """Return what was found with free functions of one variable among the hypotheses."""
         self.task.say("curves of one variable")
-        curves = free_functions(self.posterior)
+        posterior = self.posterior
+        curves = free_functions(posterior)
+        if curves and curves[0].log_odds > 0.0:
+            # the law beside it may be one that the search passed over, and what it is have a name
+            search = posterior.search.copied()
+            if search.is_better_beside(curves[0].fits[0][0]):
+                posterior = posterior_of(search, posterior)
+                curves = free_functions(posterior)
         if not curves:
-            return self
+            return replace(self, posterior=posterior)
         shown = [curve.form for curve in curves if curve.is_shown]
-        return replace(self, posterior=self.posterior.with_curves(curves), curves=shown)
+        return replace(self, posterior=posterior.with_curves(curves), curves=shown)
 
     @cached_property
     def _reported(self) -> Posterior:

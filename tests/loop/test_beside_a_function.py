@@ -1,11 +1,13 @@
 """A law behind a transducer that has no name: linear PTT by scipy, clipped or not."""
 
+import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
 import discover as dc
+from discover.effects import EffectParameter, SignalEffect, named_effects
 
 MODULUS, TIME, EPSILON = 60.0, 1.3, 0.25
 RATES = {"a": 0.7, "b": 1.5, "c": 3.0, "d": 4.5}
@@ -24,25 +26,25 @@ def start_up(rate, times):
     return found.y[1]
 
 
-def loop_of(limit):
-    """Return the loop on runs whose transducer shows a limit, over the largest stress, at most."""
+def loop_of(limit=np.inf, saturated=0.0, effects=CANDIDATES):
+    """Return the loop on runs of a transducer: a limit over the largest stress, and s in 1/Pa."""
     times, lot = np.linspace(0.05, 6.0, 80), np.random.default_rng(7)
     stress = {name: start_up(rate, times) for name, rate in RATES.items()}
     largest = limit * np.max(stress["c"])
     tables = []
     for name, values in stress.items():
         noise = 1.0 + 0.01 * lot.standard_normal(len(times))
-        shown = np.clip(values, -largest, largest) * noise
+        shown = np.clip(values / (1.0 + saturated * values), -largest, largest) * noise
         columns = {"time_s": times, "shear_rate_1_s": RATES[name], "stress_Pa": shown}
         tables.append(pd.DataFrame(columns).assign(run=name))
     data = dc.from_dataframe(pd.concat(tables))
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    return dc.close_loop(data, base, held_out=["d"], effects=CANDIDATES)
+    return dc.close_loop(data, base, held_out=["d"], effects=effects)
 
 
 @pytest.fixture(scope="module")
 def clipped():
-    return loop_of(0.6)
+    return loop_of(limit=0.6)
 
 
 def test_the_law_behind_a_transducer_that_saturates_is_the_answers_law(clipped):
@@ -76,7 +78,38 @@ def test_a_run_that_no_fit_saw_is_predicted_as_the_transducer_shows_it(clipped):
 
 
 def test_a_transducer_that_saturates_nowhere_is_not_suspected():
-    sound = loop_of(10.0)
+    sound = loop_of()
     assert sound.verdict == "effects_added"
     assert not sound.free_form
     assert not sound.answer.suspects
+
+
+class Saturation(SignalEffect):
+    """The stress that is recorded is the true one over 1 + s |σ|."""
+
+    def recorded_stress(self, values, record):
+        return record.stress / (1.0 + values[0] * jnp.abs(record.stress))
+
+
+SATURATION = Saturation(
+    name="saturation",
+    parameters=(
+        EffectParameter(
+            "s", "s", "1/Pa", low=0.0, high=1.0, scale="inverse_stress", first_trial=0.01,
+            range_source="a reading of less than half of the stress is seen at once",
+            range_scale="inverse_stress",
+        ),
+    ),
+    equation=r"\sigma_\mathrm{rec} = \sigma / (1 + s\,|\sigma|)",
+    source="Macosko 1994, Rheology, ch. 8: torque transducers", check="Hang known weights.",
+    visible="s times the root-mean-square stress of about 0.05.",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_saturation_that_a_user_names_is_found_where_sums_of_other_effects_came_nearer():
+    named = [name for name, effect in named_effects().items() if not effect.on_request]
+    found = loop_of(saturated=2e-3, effects=[*named, SATURATION])
+    assert found.verdict == "effects_added"
+    (first, *_) = found.explanations.likeliest_first
+    assert first.members[0] == ("ptt_linear", "saturation")

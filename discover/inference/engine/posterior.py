@@ -275,7 +275,7 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     share = np.exp(own - among)
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
     found = Posterior(problem, search, explanations, unexplained, fits, None)
-    found.memory["whole"] = whole, judged, beside
+    found.memory |= {**done, "whole": (whole, judged, beside)}
     if not near:
         return found
     found.left = left = _left_by(search, near[0], known)

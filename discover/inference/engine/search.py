@@ -203,6 +203,18 @@ class Search:
             best[key][1].memory["scored"] = float(share), float(score)
         return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
 
+    def is_better_beside(self, fit: Fit) -> bool:
+        """Try each effect beside the law of a fit, from its constants; return whether one helps.
+
+        `fit`: at which a law is as it would be where something else is explained; of this search or
+        with more that is linear in the records.
+        """
+        best, linear = max(map(self.rank, self.alive())), fit.linear[: len(self.fitter.errors)]
+        starts = [self.fitter.start(fit.names, fit.theta, linear)]
+        (here,) = self.fitter.fit(starts, rounds=0)
+        self.add(self.scored(here), wanted=1)
+        return max(map(self.rank, self.alive())) > best
+
     def exchange(self) -> None:
         """Put another effect in the place of each of the best set, until nothing is better."""
         seen: set[Key] = set()
