@@ -83,8 +83,20 @@ class Predictions:
         self.followed([fit])
         return fit.memory["ahead"]
 
-    def _jacobian(self, fit: Fit, predicted: np.ndarray):
-        """Return derivatives of the rows, and the variance of what each run has of its own."""
+    def _apart(self, fit: Fit, predicted: np.ndarray) -> Float[np.ndarray, " rows"]:
+        """Return the variance of what each run has of its own.
+
+        Zero, drift and loading of another run are as large as those of the fitted runs.
+        """
+        fitted, alone = self.posterior.search.fitter.errors.of_runs, self.fitter.errors.of_runs
+        assert fit.covariance is not None
+        own_variance = np.diag(fit.covariance)[len(fit.priors) :][fitted]
+        each = (fit.linear[fitted] ** 2 + own_variance).reshape(-1, len(self.problem.fitted.runs))
+        columns = self.fitter.errors.columns(predicted, np.zeros((len(self.rows), 0)))
+        return columns[:, alone] ** 2 @ np.repeat(np.mean(each, axis=1), len(self.rows.runs))
+
+    def _jacobian(self, fit: Fit, predicted: np.ndarray) -> Float[np.ndarray, "rows n"]:
+        """Return derivatives of the rows, of those of the fitted runs that they share."""
         if "jacobian" in fit.memory:
             return fit.memory["jacobian"]
         ahead = self.fitter.start(fit.names, fit.theta)
@@ -98,24 +110,16 @@ class Predictions:
         shared = np.zeros((len(self.rows), len(fit.linear)))
         of_transducers = self.fitter.errors.of_transducers
         shared[:, of_transducers] = linear[:, of_transducers]
-        of_moduli = linear[:, alone.stop :]
-        shared[:, fitted.stop : fitted.stop + of_moduli.shape[1]] = of_moduli
-        # zero, drift and loading of another run are as large as those of the fitted runs
-        assert fit.covariance is not None
-        own_variance = np.diag(fit.covariance)[len(fit.priors) :][fitted]
-        each = (fit.linear[fitted] ** 2 + own_variance).reshape(-1, len(self.problem.fitted.runs))
-        seen = np.mean(each, axis=1)
-        apart = linear[:, alone] ** 2 @ np.repeat(seen, len(self.rows.runs))
+        shared[:, fitted.stop :] = linear[:, alone.stop :]
         gain = self.fitter.errors.gain(fit.linear)[:, None]
-        found = np.column_stack([own * gain, shared]), apart
-        fit.memory["jacobian"] = found
+        fit.memory["jacobian"] = found = np.column_stack([own * gain, shared])
         return found
 
     def _of_fit(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         predicted = self._ahead(fit)
         assert predicted is not None
         assert fit.covariance is not None
-        jacobian, apart = self._jacobian(fit, predicted)
+        jacobian, apart = self._jacobian(fit, predicted), self._apart(fit, predicted)
         middle = predicted + jacobian[:, len(fit.priors) :] @ fit.linear
         variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
         noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
@@ -134,7 +138,7 @@ class Predictions:
         thetas, linear = fit.drawn(np.concatenate([lot, -lot]))
         found = self.fitter.predict(thetas)
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
-        _, apart = self._jacobian(fit, predicted)
+        apart = self._apart(fit, predicted)
         errors = self.posterior.fitter_of(fit).at(self.fitter).errors
         middle = errors.as_read(predicted, fit.linear)
         pairs = zip(found[sound], linear[sound], strict=True)
