@@ -90,6 +90,23 @@ def in_order(answer: Any) -> list[Any]:
     return sorted(answer.modes, key=lambda one: (is_added(answer, one), one.relaxation_time_s))
 
 
+def table(answer: Any) -> tuple[list[str], list[list[str]]]:
+    """Return headings and rows of the modes in order, with constants that differ between them.
+
+    In brackets what the runs do not determine.
+    """
+    each = [one for one in answer.constants if one.over_modes is not None]
+    rows = []
+    for number, mode in enumerate(in_order(answer), 1):
+        at = answer.modes.index(mode)
+        own = [one.by_mode[at] if at < len(one.by_mode) else (None, True) for one in each]
+        told = ["–" if v is None else short(v) if sure else f"({short(v)})" for v, sure in own]
+        linear = (mode.modulus_Pa, mode.relaxation_time_s)
+        name = f"{number}{' (added)' * is_added(answer, mode)}"
+        rows.append([name, *(as_constant(answer, one) for one in linear), *told])
+    return ["mode", "G (Pa)", "λ (s)", *(one.symbol for one in each)], rows
+
+
 def is_added(answer: Any, mode: Any) -> bool:
     """Return whether a mode was added to those that were declared."""
     added = (one.value for one in answer.constants if one.letter.startswith("G_+"))

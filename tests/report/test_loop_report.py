@@ -196,6 +196,17 @@ def test_what_is_less_probable_than_not_is_not_said_to_explain_the_data():
     assert "with it the data are fitted to the noise." in said_of(0.44, stress_gain=0.86)
 
 
+def test_where_no_law_is_given_no_model_and_no_band_is_drawn():
+    result = loop_result()
+    banded = tuple(replace(r, band=np.stack([r.measured, r.measured])) for r in result.records)
+    law = replace(result, records=banded)
+    for verdict, drawn in (("effects_added", True), ("no_signal", False)):
+        picture = runs_picture(replace(law, verdict=verdict))
+        for said in ("starting model", "95 % prediction band", "1 %"):
+            assert (said in picture.svg) is drawn
+        assert ("predicted" in picture.caption) is drawn
+
+
 def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():
     unexplained = replace(loop_result(), verdict="unexplained")
     text = loop_verdict(unexplained)[0]
