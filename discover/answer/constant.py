@@ -37,6 +37,15 @@ class Constant:
         told = [value for value, determined in self.by_mode if determined]
         return (min(told), max(told)) if told else None
 
+    def of_mode(self, place: int) -> str:
+        """Value of a mode, in brackets where the runs do not determine it; a dash without one."""
+        if place >= len(self.by_mode):
+            return "–"
+        value, determined = self.by_mode[place]
+        largest = max(abs(one) for one, _ in self.by_mode)
+        text = "0" if abs(value) < _SMALL * largest else significant(value, 2)
+        return text if determined else f"({text})"
+
     @property
     def may_be_zero(self) -> bool:
         """Whether its interval holds zero."""
@@ -234,7 +243,7 @@ class Constant:
 
 _MINUS = "−"
 _OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
-_SMALL = 0.01  # Share of the largest of several values below which the least is none
+_SMALL = 1e-3  # Share of the largest of several values below which the least is none
 _NEAR_END = 0.1  # Share of an interval at its ends in which a value is not near its middle
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 # Symbol and meaning of constants that no effect has

@@ -73,7 +73,7 @@ def _law(answer: Any, most: int) -> str:
         # a solvent, or modes faster than the data: a melt has the one and no other
         and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
         added = sum(modes.is_added(answer, one) for one in answer.modes)
-        count = f"{len(answer.modes) - added}{f' + {added}' * bool(added)} modes"
+        count = f"{len(answer.modes) - added}{f'+{added}' * bool(added)} modes"
         named.append(count + " and η_s" * bool(and_viscosity))
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
@@ -144,8 +144,6 @@ def description(answer: Any, brief: int = 0) -> str:
         size = f"{percent_of(found.size)}{ends}"
         # of fitted runs it is no error that a prediction could have
         said = _of_unseen(answer, size, brief) if found.unseen else _OF_FITTED + size
-        # an error below the noise is known no better than that
-        said += f"; noise {noise}" if noise and answer.noise > found.size else ""
     parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
     return f"{'; '.join(filter(None, parts))}." if said else ""
 

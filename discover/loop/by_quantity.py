@@ -191,19 +191,31 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
     )
     note = _FITTED if not held else _UNSEEN if len(held) < len(own) else "not fitted"
     if held and slow:
-        rates = [record.unshifted.fastest for record in slow]
-        note = f"{counted(len(slow), 'run')} at {span((min(rates), max(rates)))} 1/s, {note}"
-    return ExpectedError(inside, beyond, _measured_at(fast), note=note, is_residual=not held)
+        note = f"{counted(len(slow), 'run')} at {_rates([r.unshifted for r in slow])}, {note}"
+    at = _measured_at(fast, [r for r in records if not r.held_out])
+    return ExpectedError(inside, beyond, at, note=note, is_residual=not held)
 
 
-def _measured_at(fast: Sequence[RunRecord]) -> str:
-    """Return at which rate runs beyond the range were measured, and at which temperature."""
-    told = []
-    for at, own in (by_temperature(fast) or {None: fast}).items():
-        rates = [record.fastest for record in own]
-        place = "" if at is None else f" at {degrees(at)}"
-        told += [f"{span((min(rates), max(rates)))} 1/s{place}"] if rates else []
-    return f"measured at {listed(told)}" if told else ""
+def _measured_at(fast: Sequence[RunRecord], fitted: Sequence[RunRecord]) -> str:
+    """Return at which rate and temperature runs beyond the range were measured.
+
+    With the rate that this is at the temperature of the fitted runs, where that is another.
+    """
+    if not fast:
+        return ""
+    own, theirs = by_temperature(fitted), by_temperature(fast)
+    told = [f"{_rates(runs)} at {degrees(at)}" for at, runs in theirs.items()]
+    said = f"measured at {listed(told or [_rates(fast)])}"
+    if len(own) == 1 and theirs and not own.keys() & theirs.keys():
+        ((at, (first, *_)),) = own.items()
+        same = _rates(fast, first.fastest / fitted[0].fastest)
+        said += f", equivalent to {same} at {degrees(at)}"
+    return said
+
+
+def _rates(records: Sequence[RunRecord], factor: float = 1.0) -> str:
+    rates = [factor * record.fastest for record in records]
+    return f"{span((min(rates), max(rates)))} 1/s"
 
 
 def _is(record: RunRecord, kind: str) -> bool:

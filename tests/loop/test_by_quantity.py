@@ -248,7 +248,9 @@ def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement(
     assert list(told.by_temperature) == [-10.0]
     assert told.by_temperature[-10.0].rate_1_s == pytest.approx((10.0, 100.0))
     found = result([*fitted, *cold])
-    assert errors_by_quantity(found)["sigma12"].beyond_at == "measured at 20–50 1/s at −23 °C"
+    assert errors_by_quantity(found)["sigma12"].beyond_at == (
+        "measured at 20–50 1/s at −23 °C, equivalent to 200–500 1/s at −10 °C"
+    )
     found.tolerance = 0.1
     assert what_to_measure_next(found).startswith("Measure N1 at 100 1/s and −10 °C: equally")
     # what was not shifted, or has no known temperature, is told as it is

@@ -130,7 +130,7 @@ def test_the_page_says_which_modes_the_data_leave_open(tmp_path, no_pictures):
     assert "α (varies from mode to mode) at λ = 2 s" in page
     caption = page[page.index('<figure id="by_mode">') :]
     assert "(evidence over one constant: 12)" in caption
-    assert "no constants of the fluid" in caption
+    assert "these values come nearest" in caption
     (written,) = json.loads((tmp_path / "loop.json").read_text())["stages"]
     assert written["parameters"]["alpha"]["modes"][1]["ci95"] is None
 

@@ -164,11 +164,6 @@ def by_mode_picture(
         f"{significant(one.evidence[-1], 2)}); its values stand with the modes."
         for name, one in constants.items()
     )
-    doubt = ""
-    if is_unexplained:
-        doubt = (
-            " The data are not explained, so these are the values that come nearest, and no "
-            "constants of the fluid."
-        )
-    caption = f"{said}{doubt} Intervals take it that the law is the fluid's."
+    nearest = " The law leaves more than noise: these values come nearest." * is_unexplained
+    caption = f"{said}{nearest} Intervals take it that the law is the fluid's."
     return look.row_of_panels("by_mode", caption, panels, 9.0, 2.8)
