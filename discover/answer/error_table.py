@@ -48,9 +48,10 @@ def errors(answer: Any) -> list[Errors]:
         one = answer.expected(name)
         near, far = ("" if value is None else at_most(value) for value in one.spread)
         if one.is_measured and (one.inside is not None or (one.is_known and not far)):
-            seen = one.beyond is not None and not far
-            ends = (at_most(one.beyond), one.beyond_at) if seen else ("not measured",)
-            measured.append(Row(symbol, _note(answer, one), _inside(answer, one), *ends))
+            beyond, at = "not measured", ""
+            if one.beyond is not None and not far:
+                beyond, at = at_most(one.beyond), one.beyond_at
+            measured.append(Row(symbol, _note(answer, one), _inside(answer, one), beyond, at))
         if near or far:
             apart = True
             by_law.append(Row(symbol, one.note * bool(near), near, far))
@@ -67,11 +68,12 @@ def errors(answer: Any) -> list[Errors]:
     if answer.falls_above:
         told = f"falls above {answer.falls_above}"
         by_law.append(Row("steady flow curve", "of this law", told, None))
-    untested = (_BY_LAW, ("in range", _TWICE)) if apart else ("Untested", ("", ""))
-    blocks = Errors(_title(answer), ("in range", "beyond"), measured), Errors(*untested, by_law)
+    untested = (_BY_LAW, (_INSIDE, _TWICE)) if apart else ("Untested", ("", ""))
+    blocks = Errors(_title(answer), (_INSIDE, "beyond"), measured), Errors(*untested, by_law)
     return [one for one in blocks if one.rows]
 
 
+_INSIDE = "in\N{NO-BREAK SPACE}range"
 _BY_LAW, _TWICE = "Untested; equally good laws differ by", "at twice the highest rate"
 
 

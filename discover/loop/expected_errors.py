@@ -126,12 +126,12 @@ def falls_above(
     for effect in model.effects:
         if effect.kind != "constitutive":
             law[model.slices[effect.name].start] = 0.0
-    rates = np.geomspace(min(rates), max(rates), _CURVE)
-    flows = [_run(start_up(rate), np.linspace(0.0, _STEADY / rate, _SAMPLES)) for rate in rates]
+    curve = np.geomspace(min(rates), max(rates), _CURVE)
+    flows = [_run(start_up(rate), np.linspace(0.0, _STEADY / rate, _SAMPLES)) for rate in curve]
     with np.errstate(all="ignore"):
         stress = model.observables(law[None], make_batch(flows))[0, :, _SAMPLES - 1, 0]
     falling = np.flatnonzero(np.diff(stress) < -_ROUNDING * stress[:-1])
-    return float(rates[falling[0]]) if falling.size else None
+    return float(curve[falling[0]]) if falling.size else None
 
 
 # Rates of a flow curve, the strain at which it is taken, and the relative error of an integration
