@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from discover.answer import sentences
+from discover.answer import modes_in_words, sentences
 from discover.answer.constant import Constant
+from discover.answer.error_table import errors
 from discover.answer.parts import Discrepancy, ExpectedError, Mode, Range, Suspect
 from discover.equations.equation import Equation
 from discover.plain_numbers import plain
@@ -83,6 +84,7 @@ class Answer:
     tolerance: float = TOLERANCE  # relative discrepancy that is good enough
     temperature_C: float | None = None
     shift_factors: Mapping[float, float] = field(default_factory=dict)
+    falls_above: str = ""  # rate above which the law's steady shear stress falls with the rate
 
     @property
     def is_empirical(self) -> bool:
@@ -148,7 +150,7 @@ class Answer:
                 "expected_error": {name: self.expected(name).inside for name in QUANTITIES},
                 "expected_error_beyond": {name: self.expected(name).beyond for name in QUANTITIES},
                 "why_unknown": {
-                    name: f"{one.missing}{f': {one.note}' if one.note else ''}"
+                    name: one.why_unknown
                     for name in QUANTITIES
                     if not (one := self.expected(name)).is_known
                 },
@@ -174,7 +176,9 @@ class Answer:
     @property
     def lines(self) -> list[str]:
         """Answer in a few lines of text, for a terminal and for headers of exported files."""
-        return sentences.lines(self)
+        found = [self.headline, *(one.text for one in errors(self) if self.title)]
+        found += [modes_in_words.shifted(self), sentences.suspects(self), self.alternative]
+        return [line for line in [*found, f"Next: {self.next_test}" * bool(self.next_test)] if line]
 
 
 class HasAnswer:

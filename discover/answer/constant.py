@@ -28,7 +28,23 @@ class Constant:
     letter: str = ""  # LaTeX, as the equation of its effect has it
     meaning: str = ""  # in a few words, where its letter is not one of the field
     end: Literal["", "low", "high"] = ""  # of its physical range, where the value is there
-    over_modes: Span | None = None  # least and largest, where it differs from mode to mode
+    # of each mode, and whether the runs determine it, where it differs from mode to mode
+    by_mode: tuple[tuple[float, bool], ...] = ()
+
+    @property
+    def over_modes(self) -> Span | None:
+        """Least and largest value of modes that the runs determine; None where there is none."""
+        told = [value for value, determined in self.by_mode if determined]
+        return (min(told), max(told)) if told else None
+
+    def of_mode(self, place: int) -> str:
+        """Value of a mode, in brackets where the runs do not determine it; a dash without one."""
+        if place >= len(self.by_mode):
+            return "–"
+        value, determined = self.by_mode[place]
+        largest = max(abs(one) for one, _ in self.by_mode)
+        text = "0" if abs(value) < _SMALL * largest else significant(value, 2)
+        return text if determined else f"({text})"
 
     @property
     def may_be_zero(self) -> bool:
@@ -97,7 +113,7 @@ class Constant:
         if not self.determined:
             return "not determined alone"
         if self.over_modes is not None:
-            return "by mode"
+            return "by mode, below"
         if (other := self.reciprocal) is not self:
             return other.interval
         if self.bound:
@@ -199,38 +215,23 @@ class Constant:
         return ends is not None and ends[1] == math.inf
 
     @property
-    def near_end(self) -> str:
-        """Near which end of its interval the value is; empty where near none."""
-        one = self.reciprocal
-        side = "lower" if one.ci95 and 2.0 * one.value < sum(one.ci95) else "upper"
-        return f"near the {side} end of its CI" if one.is_skewed or one.bound else ""
-
-    @property
-    def is_vague(self) -> bool:
-        """Whether its interval is wider than its middle: a factor of three, or zero within.
+    def is_poor(self) -> bool:
+        """Whether it is not determined, or its interval wider than its middle: a factor of three.
 
         Such a constant has hardly a value, so that no first line gives it one.
         """
-        if not self.has_interval or self.ci95 is None:
+        if self.determined and not self.has_interval:  # declared, or that of each mode
             return False
-        low, high = self.ci95
-        return high - low > 0.5 * abs(low + high)
+        low, high = self.ci95 or (0.0, math.inf)
+        return not self.determined or high - low > 0.5 * abs(low + high)
 
     @property
     def bound(self) -> str:
-        """Bound that remains of a value at an end of its physical range; empty of one inside.
-
-        Also of a value at an end of an interval of decades, the other end of which says no more.
-        """
+        """Bound that remains of a value at an end of its physical range; empty of one inside."""
         one = self.reciprocal
         low, high = one.ci95 or (0.0, 0.0)
-        is_wide = one.has_interval and 0.0 < _DECADE * low < high < math.inf
-        if one.may_be_absent or not (one.at_limit or is_wide):
+        if one.may_be_absent or not one.at_limit:
             return ""
-        if not one.at_limit:
-            share = math.log(one.value / low) / math.log(high / low)
-            if _NEAR_END < share < 1.0 - _NEAR_END:
-                return ""
         sign, value = ("≥", low) if one.end == "high" else ("≤", high)
         return f"{sign} {one._plain(value)}"
 
@@ -242,8 +243,7 @@ class Constant:
 
 _MINUS = "−"
 _OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
-_DECADE = 10.0
-_SMALL = 0.01  # Share of the largest of several values below which the least is none
+_SMALL = 1e-3  # Share of the largest of several values below which the least is none
 _NEAR_END = 0.1  # Share of an interval at its ends in which a value is not near its middle
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 # Symbol and meaning of constants that no effect has

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from discover.words import listed, significant
+from discover.words import significant
 
 
 def degrees(temperature: float) -> str:
@@ -62,19 +62,15 @@ def short(value: float) -> str:
 
 
 def linear_part(answer: Any) -> str:
-    """Return moduli, times, solvent and shift factors; of more than a few modes their ends."""
+    """Return moduli, times, solvent and shift factors; of several modes their ends."""
     found = []
-    modes = in_order(answer)
     for letter, unit, values in (
-        ("G", "Pa", [mode.modulus_Pa for mode in modes]),
-        ("λ", "s", [mode.relaxation_time_s for mode in modes]),
+        ("G", "Pa", [mode.modulus_Pa for mode in answer.modes]),
+        ("λ", "s", [mode.relaxation_time_s for mode in answer.modes]),
     ):
-        if len(values) > FEW_MODES:
-            low, high = (f"{short(end)} {unit}" for end in (min(values), max(values)))
-            found.append(f"{letter} from {low} to {high}")
-        elif values:
-            told = listed([as_constant(answer, one) for one in values])
-            found.append(f"{letter} = {told} {unit}")
+        low, high = (f"{short(end)} {unit}" for end in (min(values), max(values)))
+        only = f"{letter} = {as_constant(answer, values[0])} {unit}"
+        found.append(f"{letter} from {low} to {high}" if len(values) > 1 else only)
     if answer.solvent_viscosity_Pa_s:
         found.append(f"η_s = {as_constant(answer, answer.solvent_viscosity_Pa_s)} Pa s")
     found += [f"a_T = {significant(one, 3)} at {degrees(at)}" for at, one in shifts(answer)]
@@ -82,12 +78,25 @@ def linear_part(answer: Any) -> str:
 
 
 FEW_MODES = 3
-"""Relaxation modes up to which all are listed."""
+"""Relaxation modes up to which their table is open."""
 
 
-def in_order(answer: Any) -> list[Any]:
-    """Return the modes from the shortest time to the longest, then one that was added."""
-    return sorted(answer.modes, key=lambda one: (is_added(answer, one), one.relaxation_time_s))
+def table(answer: Any) -> tuple[list[str], list[list[str]]]:
+    """Return headings and rows of the modes, with constants that differ between them.
+
+    From the shortest time to the longest, then one that was added; in brackets what the runs do not
+    determine.
+    """
+    each = [one for one in answer.constants if one.over_modes is not None]
+    rows = []
+    order = sorted(answer.modes, key=lambda one: (is_added(answer, one), one.relaxation_time_s))
+    for number, mode in enumerate(order, 1):
+        at = answer.modes.index(mode)
+        told = [one.of_mode(at) for one in each]
+        linear = (mode.modulus_Pa, mode.relaxation_time_s)
+        name = f"{number}{' (added)' * is_added(answer, mode)}"
+        rows.append([name, *(as_constant(answer, one) for one in linear), *told])
+    return ["mode", "G (Pa)", "λ (s)", *(one.symbol for one in each)], rows
 
 
 def is_added(answer: Any, mode: Any) -> bool:
@@ -98,5 +107,6 @@ def is_added(answer: Any, mode: Any) -> bool:
 
 def as_constant(answer: Any, value: float) -> str:
     """Return a modulus, time or viscosity with the digits that it has among the constants."""
-    own = (c.digits for c in answer.constants if math.isclose(c.value, value, rel_tol=1e-6))
-    return significant(value, next(own, 3))
+    own = (one for one in answer.constants if math.isclose(one.value, value, rel_tol=1e-6))
+    found = next((one.number.removesuffix(f" {one.unit}") for one in own), "")
+    return found or significant(value, 3)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from discover.answer.constant import Constant, Span
-from discover.words import LEVEL, effect_title
+from discover.words import LEVEL, effect_title, percent_of
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,8 @@ class ExpectedError:
         unknown.
     `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
     `missing`: what stands in place of a number that is unknown.
-    `note`: why it is unknown, or on what it rests: ``7 unseen runs``.
+    `note`: why it is unknown, or on what it rests: ``7 unseen runs``. `spread`: what nothing
+    measured differs by between laws that fit as well, inside and at twice the highest rate.
     """
 
     inside: float | None = None
@@ -114,6 +115,7 @@ class ExpectedError:
     note: str = ""
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
     is_residual: bool = False  # of fitted runs, which is no error to expect
+    spread: tuple[float | None, float | None] = (None, None)
 
     def __post_init__(self) -> None:
         # a few faster runs may be missed by less, and laws may differ by less there: by chance
@@ -125,6 +127,13 @@ class ExpectedError:
     def is_known(self) -> bool:
         """Whether there is a number."""
         return self.inside is not None or self.beyond is not None
+
+    @property
+    def why_unknown(self) -> str:
+        """Why there is no number."""
+        if (apart := self.spread[0]) is None:
+            return f"{self.missing}: {self.note}".removesuffix(": ")
+        return f"{self.note or self.missing}: laws that fit as well differ by {percent_of(apart)}"
 
 
 @dataclass(frozen=True)

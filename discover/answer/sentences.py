@@ -1,13 +1,15 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from discover.answer import modes_in_words as modes
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
-# Words of the first lines, and constants that they name where these allow it
-_MOST_WORDS, _MOST_CONSTANTS = 60, 3
+_MOST_WORDS = 60
+# Constants that the first lines name until they are that short (-1: of a sum not even how
+# many), and how brief `description` is
+_SHORTER = ((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3), (-1, 3), (-1, 4))
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -31,7 +33,7 @@ def first_lines(answer: Any) -> tuple[str, str]:
     As short as need be: what gives way is in the table. Without a law, what stands in its place.
     """
     told = "", ""
-    for most, brief in ((_MOST_CONSTANTS, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3)):
+    for most, brief in _SHORTER:
         parts = description(answer, brief), answer.failed, where(answer)
         told = _law(answer, most), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
@@ -59,26 +61,36 @@ def _law(answer: Any, most: int) -> str:
         if not (several and one.name in _OF_MODES) and not (answer.is_empirical and one.is_term)
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
-    certain = [one for one in own if one.determined and not one.is_vague]
-    named, every = constants(certain[:most]), len(answer.constants)
-    if answer.law is None and every > min(most, len(certain)):  # some alone are no law
-        certain, named = [], [counted(every, "constant")] if most else []
+    certain = [one for one in own if not one.is_poor]
+    named, every = constants(certain[: max(most, 0)]), answer.constants
+    if answer.law is None and len(every) > min(most, len(certain)):  # some alone are no law
+        each = [one.symbol for one in every if one.over_modes is not None]
+        poor = sum(one.is_poor for one in every)
+        count = counted(len(every) - len(each), "constant") + f" ({poor} {POORLY})" * bool(poor)
+        named = [" and ".join([count, *(f"{one} by mode" for one in each)])] * (most >= 0)
+        certain = []
     if several:
         # a solvent, or modes faster than the data: a melt has the one and no other
         and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
-        named.append(counted(len(answer.modes), "mode") + " and η_s" * bool(and_viscosity))
+        added = sum(modes.is_added(answer, one) for one in answer.modes)
+        count = f"{len(answer.modes) - added}{f'+{added}' * bool(added)} modes"
+        named.append(count + " and η_s" * bool(and_viscosity))
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     for one in answer.constants:
-        known = one.name in OF_SWEEP and one.determined and not one.is_vague
+        known = one.name in OF_SWEEP and not one.is_poor
         if known and differ(one.ci95, answer.tolerance):
             level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
             named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None and not answer.shift_factors:
         named.append(f"at {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
+
+
+POORLY = "poorly determined"
+"""What is said of a constant whose interval is wider than a factor of three."""
 
 
 def constants(several: Sequence[Any]) -> list[str]:
@@ -114,8 +126,8 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
 def description(answer: Any, brief: int = 0) -> str:
     """Return how well the law describes the runs, allowing for what, and if that is enough.
 
-    `brief`: 1 without counts of runs and names of suspects, 2 without other rates, 3 without
-    interval.
+    `brief`: 1 without counts of runs and names of suspects, 2 without the worst run, 3 without
+    interval, 4 without suspects: the table has them.
     """
     if not answer.title:
         return ""
@@ -132,8 +144,6 @@ def description(answer: Any, brief: int = 0) -> str:
         size = f"{percent_of(found.size)}{ends}"
         # of fitted runs it is no error that a prediction could have
         said = _of_unseen(answer, size, brief) if found.unseen else _OF_FITTED + size
-        # an error below the noise is known no better than that
-        said += f"; noise {noise}" if noise and answer.noise > found.size else ""
     parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
     return f"{'; '.join(filter(None, parts))}." if said else ""
 
@@ -144,29 +154,25 @@ _OF_FITTED = "Residual of the fitted runs "
 def _of_unseen(answer: Any, size: str, brief: int) -> str:
     """Return the errors of unseen runs: of each quantity where several were measured, else of all.
 
-    And the worst of these, where one misses the tolerance, and those of faster runs.
+    And the worst of these, where one misses the tolerance and the range does not say it.
     """
     each = [
         f"{symbol} {at_most(one.inside)}"
         for name, symbol in SYMBOLS.items()
         if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
     ]
-    more = []
-    if (worst := worst_run(answer)) is not None:
-        more.append(f"worst run {worst[1]}")
-    stress = answer.expected("sigma12")
-    if stress.beyond is not None and stress.beyond_at.startswith(MEASURED_AT) and brief < 2:
-        at = stress.beyond_at.removeprefix(MEASURED_AT).strip()
-        more.append(f"beyond range {at_most(stress.beyond)} at {at}")
-    told = [*each, *more] if len(each) > 1 else [size, *more]
-    if len(each) > 1 and more and answer.range.flows == ("shear",):  # these are runs of σ12
-        told = [f"{each[0]} ({', '.join(more)})", *each[1:]]
+    told = each if len(each) > 1 else [size]
+    worst = None if brief > 1 or answer.discrepancy.met_up_to else worst_run(answer)
+    if worst is not None and len(each) > 1 and answer.range.flows == ("shear",):  # a run of σ12
+        told = [f"{each[0]} (worst run {worst[1]})", *each[1:]]
+    elif worst is not None:
+        told = [*told, f"worst run {worst[1]}"]
     return f"Error on {answer.discrepancy.unseen}: {', '.join(told)}"
 
 
 def _corrected(answer: Any, brief: int) -> str:
     """Return what of the instrument the errors allow for; empty where nothing."""
-    names = [effect_title(one.effect) for one in answer.suspects]
+    names = [effect_title(one.effect) for one in answer.suspects if brief < 4]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
     told = listed(names) if few else f"{len(names)} measurement errors"
     # no instrument shapes what is measured in extension
@@ -190,10 +196,6 @@ def tolerance(answer: Any, brief: int = 0) -> str:
         every = len(answer.discrepancy.by_run)
         state = f"met in {every - over or 'none'} of {counted(every, 'run')}"
     return f"tolerance {percent_of(answer.tolerance)} {state}"
-
-
-MEASURED_AT = "measured at"
-"""What stands before the rate at which an error beyond the range was measured."""
 
 
 def flows_of(kinds: Sequence[str]) -> str:
@@ -305,75 +307,15 @@ def worst_run(answer: Any) -> tuple[str, str] | None:
     return name, percent_of(over[name])
 
 
-class Row(NamedTuple):
-    """Row of the table of errors: quantities, on what that rests, errors in the range and beyond.
-
-    `is_known`: whether there is a number; else both errors are one reason why not.
-    """
-
-    symbol: str
-    note: str
-    inside: str
-    beyond: str = ""
-    beyond_at: str = ""
-    is_known: bool = True
-
-    @property
-    def text(self) -> str:
-        """The row as text goes on."""
-        beyond = f", beyond {self.beyond} ({self.beyond_at})" if self.beyond_at else ""
-        return f"{self.symbol} {self.inside}{f' ({self.note})' if self.note else ''}{beyond}"
-
-
-def errors(answer: Any) -> list[Row]:
-    """Return errors by quantity, of the run that is missed most, and of the best classical law.
-
-    Quantities of which nothing is known for the same reason share a row.
-    """
-    found: list[Row] = []
-    for name, symbol in SYMBOLS.items():
-        one = answer.expected(name)
-        inside, beyond = _error(one, one.inside), _error(one, one.beyond)
-        at = one.beyond_at if one.beyond is not None else ""
-        row = Row(symbol, note(answer, name), inside, beyond, at, one.is_known)
-        if found and not row.is_known and found[-1] == row._replace(symbol=found[-1].symbol):
-            row = row._replace(symbol=f"{found.pop().symbol}, {symbol}")
-        found.append(row)
-    if (worst := worst_run(answer)) is not None:
-        found.append(Row("worst run in range", *worst))
-    if answer.best_classical is not None:
-        near, error = answer.best_classical
-        found.append(Row("best classical law", near, percent_of(error)))
-    return found
-
-
-def error_title(answer: Any) -> str:
-    """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
-    of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
-    return f"{of} (noise subtracted)"
-
-
-def note(answer: Any, quantity: str) -> str:
-    """Return on what an error rests, and that one measured is more than the tolerance."""
-    one = answer.expected(quantity)
-    missed = one.is_measured and (one.inside or 0.0) > answer.tolerance
-    return ", ".join(filter(None, [one.note, "above tolerance" * missed]))
-
-
-def _error(one: Any, value: float | None) -> str:
-    """Return an expected error, or why there is none."""
-    if value is not None:
-        return at_most(value) if value else "within noise"
-    return "no data" if one.is_known else one.missing
-
-
 def at_most(value: float) -> str:
-    """Return a relative error; of one that is large only that it is."""
+    """Return a relative error; of one that is large or tiny only that it is."""
+    if value < _LITTLE:
+        return f"< {percent_of(_LITTLE)}"
     return percent_of(value) if value <= MUCH else f"> {percent_of(MUCH)}"
 
 
-MUCH = 2.0
-"""Relative error from which on its size says nothing."""
+MUCH, _LITTLE = 2.0, 1e-3
+"""Relative errors from which on, and up to which, their size says nothing."""
 
 
 def suspects(answer: Any) -> str:
@@ -386,7 +328,7 @@ def suspects(answer: Any) -> str:
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 
-SUSPECTED = "Suspected in the measurement, not part of the law"
+SUSPECTED = "Suspected in the measurement, not part of the law; errors allow for it"
 """Heading of effects of the instrument and of the flow in the gap."""
 
 NOT_SEPARABLE = "sizes not separable"
@@ -396,14 +338,3 @@ NOT_SEPARABLE = "sizes not separable"
 def separable(answer: Any) -> bool:
     """Return whether the runs give each suspect a size of its own."""
     return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)
-
-
-def lines(answer: Any) -> list[str]:
-    """Return the answer as lines of text."""
-    found = [headline(answer)]
-    if answer.title:
-        told = "; ".join(row.text for row in errors(answer))
-        found.append(f"{error_title(answer)}: {told}.")
-    found += [modes.shifted(answer), suspects(answer), answer.alternative]
-    found.append(f"Next: {answer.next_test}" if answer.next_test else "")
-    return [line for line in found if line]

@@ -78,7 +78,7 @@ class Structure(StateEffect):
 
 
 class TwoStructures(Structure):
-    """Two structures with one steady state: s = (1 − w) s₁ + w s₂, of times t_b and R t_b.
+    """Two structures with one steady state: s = (1 − w) q₁ + w q₂, of times t₁ and t₂ = R t₁.
 
     [Wei, Solomon & Larson 2018, J. Rheol. 62, 321]. R and w stand in the place of m, which is
     Cross's: no record of which we know determines all five constants.
@@ -106,7 +106,7 @@ BUILD_UP_TIME = EffectParameter(
     meaning="build-up time",
     range_source="as for thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
 )  # fmt: skip
-_FAST = replace(BUILD_UP_TIME, meaning="build-up time of the fast structure, i = 1")
+_FAST = replace(BUILD_UP_TIME, symbol="t_1", meaning="build-up time of the fast structure, q_1")
 
 EXPONENT = EffectParameter(
     "exponent", "m", low=0.1, high=4.0, first_trial=1.0,
@@ -117,14 +117,14 @@ EXPONENT = EffectParameter(
 
 SLOWNESS = EffectParameter(
     "slowness", "R", low=2.0, high=1e4, first_trial=30.0,
-    meaning="slow over fast build-up time",
+    meaning="slow over fast build-up time, t_2/t_1",
     range_source="structure times less than a factor of two apart count as one (those of Wei, "
     "Solomon & Larson 2018 spread over decades)",
 )  # fmt: skip
 
 SLOW_SHARE = EffectParameter(
     "slow_share", "w", low=0.01, high=0.99, first_trial=0.1,
-    meaning="share of the slow structure, i = 2",
+    meaning="share of the slow structure, q_2",
     range_source="with less than one part in a hundred of either there is only one structure",
 )  # fmt: skip
 
@@ -181,9 +181,8 @@ THIXOTROPIC_RELAXATION_BY_STRESS = _one_structure(
 THIXOTROPIC_RELAXATION_TWO_TIMES = TwoStructures(
     name="thixotropic_relaxation_two_times",
     parameters=(INVERSE_RATE, _FAST, SLOWNESS, SLOW_SHARE),
-    equation=r"\lambda_k \to [(1 - w) s_1 + w s_2]\,\lambda_k,\quad t_i\frac{ds_i}{dt} = 1 - s_i"
-    r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^{2/3} s_i,"
-    r"\quad t_1 = t_\mathrm{b},\ t_2 = R\,t_\mathrm{b}",
+    equation=r"\lambda_k \to [(1 - w)\,q_1 + w\,q_2]\,\lambda_k,\quad t_i\frac{dq_i}{dt} = 1 - q_i"
+    r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^{2/3} q_i,\quad t_2 = R\,t_1",
     source="Wei, Solomon & Larson 2018, J. Rheol. 62, 321, for several times with one steady state",
     check="Rest for different lengths before a start: recovery in two steps.",
     visible="as thixotropic_relaxation.",

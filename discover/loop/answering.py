@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.answer import (
-    Answer,
-    Constant,
-    Mode,
-    Suspect,
-)
+from discover.answer import Answer, Constant, Mode, Suspect
 from discover.answer import modes_in_words as modes
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import ByMode, named_law
@@ -27,16 +22,15 @@ from discover.loop import by_quantity
 from discover.loop.fitted_range import range_of
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.runs import RunRecord
-from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
-from discover.statistics.residual import fast_part
-from discover.words import (
-    effect_title,
-    effects_title,
-    listed,
-    percent_of,
-    readable,
-    significant,
+from discover.loop.sentences import (
+    EXPLAINED,
+    as_measured,
+    suspected,
+    untested_by,
+    what_to_measure_next,
 )
+from discover.statistics.residual import fast_part
+from discover.words import effect_title, effects_title, listed, percent_of, readable
 
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
 _SETTLED = 0.95  # Probability from which on nothing is said of other laws
@@ -96,6 +90,7 @@ def loop_answer(result: Any) -> Answer:
         tolerance=result.tolerance,
         temperature_C=result.temperature_C,
         shift_factors=_shift_factors(result.records),
+        falls_above=_falls_above(result),
     )
     if equation is None:
         near = result.nearest_law
@@ -111,6 +106,15 @@ def _scatter(records: Sequence[RunRecord]) -> str:
     found = [fast_part(record.measured) for record in records if record.quantity != "strain"]
     found = [one for one in found if one > 0.0]
     return f" of {modes.span((min(found), max(found)))} Pa rms" if found else ""
+
+
+def _falls_above(result: Any) -> str:
+    """Return the rate above which the law's flow curve falls, as it was measured; empty of none."""
+    spread = result.spread_of_laws.get("sigma12")
+    if spread is None or spread.falls_above is None:
+        return ""
+    fitted = [record for record in result.records if not record.held_out]
+    return as_measured(fitted, spread.falls_above).replace(" and ", " at ")
 
 
 def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
@@ -206,15 +210,8 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
         return None
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
-    name, least = _MAXIMUM.get(near.law, ("", 0.0))
-    has_maximum = name in near.constants and near.constants[name].value > least
-    maximum = ", non-monotonic flow curve" if has_maximum else ""
-    return f"{', '.join(said)}{maximum}", near.size
-
-
-# Constant above which the flow curve of each mode has a maximum   [Giesekus 1982, J. Non-Newtonian
-# Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255].
-_MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
+    falls = ", non-monotonic flow curve" * near.falls
+    return f"{', '.join(said)}{falls}", near.size
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -306,9 +303,8 @@ def _law_first(values: Mapping[str, ByMode], found: Sequence[Constant]) -> list[
         if close:
             left.remove(close[0])
         if len(of_modes) > 1 and one.over_modes is None:
-            one = replace(
-                one, value=float(np.mean(of_modes)), over_modes=(min(of_modes), max(of_modes))
-            )
+            each = tuple((value, True) for value in of_modes)
+            one = replace(one, value=float(np.mean(of_modes)), by_mode=each)
         own.append(one)
     return [*own, *left]
 
@@ -316,18 +312,7 @@ def _law_first(values: Mapping[str, ByMode], found: Sequence[Constant]) -> list[
 def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     """Return the constants of an effect that was added, with letters that no other has."""
     letters = result.letters.get(stage.effect, {})
-    found = _constants(stage.parameters, stage.left_open, stage.effect, letters)
-    if stage.kind != "constitutive" or stage.effect in (*LAW_OF_EFFECT, *STRUCTURES):
-        return found
-    first, *others = found
-    if not Suspect(stage.effect, found).is_established:
-        return found
-    odds = float(np.exp(min(0.5 * stage.evidence, 10.0)))
-    told = f"odds for it {f'> {_SURE}' if odds > _SURE else significant(odds, 2)}:1"
-    return replace(first, meaning="; ".join(filter(None, [first.said, told]))), *others
-
-
-_SURE = 1000  # Odds from which on more say no more
+    return _constants(stage.parameters, stage.left_open, stage.effect, letters)
 
 
 def _constants(
@@ -349,13 +334,12 @@ def _constants(
             meaning = known[name].meaning or (effect_title(effect) if is_letter else words)
         if by_mode is not None:
             letter = f"{letter or readable(name)}_k"
-            meaning = "; ".join(filter(None, [meaning, "each under “Constants by mode”"]))
         found.append(
             Constant(
                 name, one.value, one.ci95, one.unit or "1",
                 name not in left_open and not (fitted is not None and fitted.is_open),
                 letter, meaning, "" if fitted is None else fitted.at_end,
-                None if by_mode is None else by_mode.span,
+                () if by_mode is None else tuple((m.value, not m.left_open) for m in by_mode.modes),
             )
         )  # fmt: skip
     return tuple(found)

@@ -9,7 +9,6 @@ from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
-from discover.answer.sentences import MEASURED_AT, at_most
 from discover.loop.fitted_range import by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
@@ -26,8 +25,6 @@ FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
 _UNSEEN, _FITTED = "unseen runs", "fitted runs"
-_DIFFER = "laws that fit as well differ by"
-_TWICE = "estimated at twice the highest rate"
 
 
 def beyond_noise(error: float, noise: float | None) -> float:
@@ -110,48 +107,36 @@ def _held_inside(result: Any) -> list[RunRecord]:
 def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": of_stress(result)}
-    settled = normal_stress_settled(result)
     for kind in ("N1", "N2", "uniaxial"):
         own = measured(result.records, kind, result.noise_floor)
-        if own is not None:
-            unseen = unseen_errors(result, kind)
-            if (inside := _mean([*unseen.values()])) is not None:
-                note = counted(len(unseen), "unseen run")
-                own = replace(own, inside=inside, note=note, is_residual=False)
-            found[kind] = own
-            continue
-        apart = differing(result, kind)
-        differ = "" if apart is None else f"{_DIFFER} {at_most(apart)}"
-        above = f", limit {percent_of(_APART)}" if apart is not None and apart >= _APART else ""
-        if kind == "N1" and settled:
-            beyond = result.spread_of_laws[kind].beyond
-            note = f"{_without_data(result)}: {_DIFFER} this"
-            found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
-        elif kind == "N2":
-            found[kind] = _second_difference(result, differ)
-        elif above or (kind == "N1" and differ):
-            found[kind] = ExpectedError(missing="not determined", note=f"{differ}{above}")
-        else:
-            found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
+        unseen = {} if own is None else unseen_errors(result, kind)
+        if own is not None and (inside := _mean([*unseen.values()])) is not None:
+            note = counted(len(unseen), "unseen run")
+            own = replace(own, inside=inside, note=note, is_residual=False)
+        found[kind] = own or _by_law(result, kind)
     return found
 
 
-def _without_data(result: Any) -> str:
-    """Return why nothing tests N1: it was not recorded, or is not fitted (`[data] observe`)."""
-    return "not fitted" if any(record.has_normal_stress for record in result.records) else "no data"
+def _by_law(result: Any, kind: str) -> ExpectedError:
+    """Return what is known of a stress that nothing measured: by how much equally good laws differ.
 
-
-def _second_difference(result: Any, differ: str) -> ExpectedError:
-    """Return what is said of N2 where nothing measured it: that of the law, unless laws differ."""
-    apart, spread = differing(result, "N2"), result.spread_of_laws.get("N2")
-    if apart and apart > _WORTH_SAYING:
-        note = f"{differ} of N1, limit {percent_of(_WORTH_SAYING)}"
-        return ExpectedError(missing="not determined", note=note)
-    ratio = None if spread is None else spread.over_n1
-    if ratio is None:
-        return ExpectedError()
-    share = "0" if abs(ratio) < _NOTHING else f"N2/N1 ≈ {significant(ratio, 2)}"
-    return ExpectedError(note=f"{share} by this law")
+    A number where they agree in N1; N2 is that of the law, unless they differ.
+    """
+    apart, limit = differing(result, kind), _WORTH_SAYING if kind == "N2" else _APART
+    ends = _spread(result, kind)
+    if kind == "N1" and normal_stress_settled(result):
+        recorded = any(record.has_normal_stress for record in result.records)
+        note = "recorded, not fitted" if recorded else ""
+        return ExpectedError(*ends, note=note, is_measured=False, spread=ends)
+    if apart is not None and (apart >= limit or kind == "N1"):
+        above = f", {'of N1, ' * (kind == 'N2')}limit {percent_of(limit)}" * (apart >= limit)
+        missing = "not determined"
+        return ExpectedError(missing=missing, note=f"{missing}{above}", spread=ends)
+    ratio = None if kind != "N2" or ends[0] is None else result.spread_of_laws[kind].over_n1
+    if ratio is not None:
+        share = "0" if abs(ratio) < _NOTHING else f"N2/N1 ≈ {significant(ratio, 2)}"
+        return ExpectedError(note=f"{share} by this law")
+    return ExpectedError(spread=ends if apart and apart > _WORTH_SAYING else (None, None))
 
 
 _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
@@ -166,8 +151,12 @@ def normal_stress_settled(result: Any) -> bool:
 
 def differing(result: Any, kind: str) -> float | None:
     """Return by how much laws that fit as well differ in a quantity in the range."""
-    spread = result.spread_of_laws.get(kind)
-    return None if spread is None else spread.inside
+    return _spread(result, kind)[0]
+
+
+def _spread(result: Any, kind: str) -> tuple[float | None, float | None]:
+    found = result.spread_of_laws.get(kind)
+    return (None, None) if found is None else (found.inside, found.beyond)
 
 
 def of_stress(result: Any) -> ExpectedError:
@@ -175,15 +164,14 @@ def of_stress(result: Any) -> ExpectedError:
     errors = unseen_errors(result, "sigma12")
     inside = _mean([*errors.values()])
     own = measured(result.records, "sigma12", result.noise_floor) or ExpectedError()
-    beyond, at = own.beyond, own.beyond_at
-    spread = result.spread_of_laws.get("sigma12")
-    if beyond is None and spread is not None and spread.beyond is not None:
-        beyond, at = spread.beyond, _TWICE
+    beyond, at, spread = own.beyond, own.beyond_at, (None, None)
+    if beyond is None and (apart := _spread(result, "sigma12")[1]) is not None:
+        beyond, spread = apart, (None, apart)
     if inside is None and result.material is not None:
         inside = beyond_noise(result.error_after.fit, result.noise_floor)
         return ExpectedError(inside, beyond, at, note=_FITTED, is_residual=True)
     note = counted(len(errors), "unseen run") if errors else ""
-    return ExpectedError(inside, beyond, at, note=note)
+    return ExpectedError(inside, beyond, at, note=note, spread=spread)
 
 
 def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
@@ -201,21 +189,33 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
     inside, beyond = (
         _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )
-    note = _UNSEEN if held else _FITTED
+    note = _FITTED if not held else _UNSEEN if len(held) < len(own) else "not fitted"
     if held and slow:
-        rates = [record.unshifted.fastest for record in slow]
-        note += f", {span((min(rates), max(rates)))} 1/s"
-    return ExpectedError(inside, beyond, _measured_at(fast), note=note, is_residual=not held)
+        note = f"{counted(len(slow), 'run')} at {_rates([r.unshifted for r in slow])}, {note}"
+    at = _measured_at(fast, [r for r in records if not r.held_out])
+    return ExpectedError(inside, beyond, at, note=note, is_residual=not held)
 
 
-def _measured_at(fast: Sequence[RunRecord]) -> str:
-    """Return at which rate runs beyond the range were measured, and at which temperature."""
-    told = []
-    for at, own in (by_temperature(fast) or {None: fast}).items():
-        rates = [record.fastest for record in own]
-        place = "" if at is None else f" at {degrees(at)}"
-        told += [f"{span((min(rates), max(rates)))} 1/s{place}"] if rates else []
-    return f"{MEASURED_AT} {listed(told)}" if told else ""
+def _measured_at(fast: Sequence[RunRecord], fitted: Sequence[RunRecord]) -> str:
+    """Return at which rate and temperature runs beyond the range were measured.
+
+    With the rate that this is at the temperature of the fitted runs, where that is another.
+    """
+    if not fast:
+        return ""
+    own, theirs = by_temperature(fitted), by_temperature(fast)
+    told = [f"{_rates(runs)} at {degrees(at)}" for at, runs in theirs.items()]
+    said = f"measured at {listed(told or [_rates(fast)])}"
+    if len(own) == 1 and theirs and not own.keys() & theirs.keys():
+        ((at, (first, *_)),) = own.items()
+        same = _rates(fast, first.fastest / fitted[0].fastest)
+        said += f", equivalent to {same} at {degrees(at)}"
+    return said
+
+
+def _rates(records: Sequence[RunRecord], factor: float = 1.0) -> str:
+    rates = [factor * record.fastest for record in records]
+    return f"{span((min(rates), max(rates)))} 1/s"
 
 
 def _is(record: RunRecord, kind: str) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.forward import make_batch
+from discover.forward import AugmentedModel, make_batch
 from discover.inference.engine import Posterior
 from discover.inference.engine.fit import Fit
 from discover.linear_algebra_threads import in_one_thread
@@ -36,12 +36,14 @@ class Spread:
     fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1
     inside, by their rms, with the sign of N2/N1; None of other quantities. `stress`: the quantity
     itself by the reported law, rms in Pa of the fastest flow inside; None where it diverges.
+    `falls_above`: of σ12, see `falls_above`.
     """
 
     inside: float | None
     beyond: float | None
     over_n1: float | None = None
     stress: float | None = None
+    falls_above: float | None = None
 
 
 @in_one_thread
@@ -106,9 +108,34 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             _largest(of["beyond"]),
             ratio if kind == "N2" else None,
             _largest([stress[kind]]),
+            falls_above(model, best.theta, rates) if kind == "sigma12" else None,
         )
         for kind, of in own.items()
     }
+
+
+def falls_above(
+    model: AugmentedModel, theta: Float[np.ndarray, " p"], rates: Sequence[float]
+) -> float | None:
+    """Return the rate in 1/s above which the law's steady shear stress falls as the rate grows.
+
+    Between the ends of `rates` in 1/s; None where it rises throughout. The instrument is ideal,
+    and a start-up of a long strain stands for steady flow: its program is made already.
+    """
+    law = theta.copy()
+    for effect in model.effects:
+        if effect.kind != "constitutive":
+            law[model.slices[effect.name].start] = 0.0
+    curve = np.geomspace(min(rates), max(rates), _CURVE)
+    flows = [_run(start_up(rate), np.linspace(0.0, _STEADY / rate, _SAMPLES)) for rate in curve]
+    with np.errstate(all="ignore"):
+        stress = model.observables(law[None], make_batch(flows))[0, :, _SAMPLES - 1, 0]
+    falling = np.flatnonzero(np.diff(stress) < -_ROUNDING * stress[:-1])
+    return float(curve[falling[0]]) if falling.size else None
+
+
+# Rates of a flow curve, the strain at which it is taken, and the relative error of an integration
+_CURVE, _STEADY, _ROUNDING = 33, 100.0, 1e-3
 
 
 def _largest(values: Sequence[float]) -> float | None:

@@ -97,12 +97,6 @@ class ConstantByMode(StageParameter):
         """Value of each mode."""
         return tuple(mode.value for mode in self.modes)
 
-    @property
-    def span(self) -> tuple[float, float] | None:
-        """Least and largest value of the modes that the runs determine; None where none is."""
-        told = [mode.value for mode in self.modes if not mode.left_open]
-        return (min(told), max(told)) if told else None
-
 
 @dataclass(frozen=True)
 class Stage:
@@ -247,13 +241,15 @@ class NearestLaw:
 
     `law`: name of the law, as in `discover.laws`. `constants`: by name, with their 95 % intervals
     by the fitted runs. `size`: root-mean-square relative error of fitted runs that are left out in
-    turn. `equation`: the law with its modes, for exports.
+    turn. `equation`: the law with its modes, for exports. `falls`: whether its steady shear stress
+    falls somewhere between the rates of the runs.
     """
 
     law: str
     constants: Mapping[str, StageParameter]
     size: float
     equation: Equation
+    falls: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Return the law as ``loop.json`` holds it."""

@@ -5,7 +5,7 @@ from typing import Any
 
 from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, differ
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.runs import RunRecord
 
@@ -114,12 +114,16 @@ def _of_sweep(result: Any) -> str:
 
 def _fastest(records: Sequence[RunRecord]) -> str:
     """Return the rate of the fastest run as it was measured, with its temperature if shifted."""
-    if not records:
-        return "that of the fastest run"
+    return as_measured(records) if records else "that of the fastest run"
+
+
+def as_measured(records: Sequence[RunRecord], rate: float | None = None) -> str:
+    """Return a rate, by default its own, as the fastest run has it at its temperature."""
     fastest = max(records, key=lambda record: record.fastest)
+    share = 1.0 if rate is None else rate / fastest.fastest
     at = fastest.temperature_C
     place = "" if fastest.shift == 1.0 or at is None else f" and {degrees(at)}"
-    return f"{words.significant(fastest.unshifted.fastest, 2)} 1/s{place}"
+    return f"{words.significant(share * fastest.unshifted.fastest, 2)} 1/s{place}"
 
 
 def _as_clause(check: str) -> str:
@@ -142,19 +146,7 @@ def _of_another_stress(result: Any) -> str:
             continue
         if _is_in_reach(result, kind):
             apart_by = f"equally good laws differ by {words.percent_of(apart)}"
-            said = f"{title} at {_fastest(_sheared(result))}: {apart_by}."
-            return f"{also} and {_as_clause(said)}." if (also := _unfitted(result)) else said
-    return ""
-
-
-def _unfitted(result: Any) -> str:
-    """Return that a fit to what was held out alone comes first; empty where it is described."""
-    fitted = {(r.flow, r.quantity) for r in result.records if not r.held_out}
-    others = [r for r in result.records if (r.flow, r.quantity) not in fitted]
-    for kind in ("N1", "uniaxial"):
-        own = measured(others, kind, result.noise_floor)
-        if own is not None and (own.inside or own.beyond or 0.0) > result.tolerance:
-            return f"Fit {SYMBOLS[kind]} too,"
+            return f"{title} at {_fastest(_sheared(result))}: {apart_by}."
     return ""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from discover import words
 from discover.answer import Answer, Constant, Suspect, sentences
 from discover.answer import modes_in_words as modes
+from discover.answer.error_table import errors
 from discover.effects import StateEffect
 from discover.equations import FORMATS, Equation
 from discover.equations.spelling.markup import law_element
@@ -47,7 +48,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "title": (answer.title or answer.instead.lower()).partition(":")[0],
         "headline": headline,
         "quality": quality,
-        "errors": sentences.error_title(answer).lower(),
+        "fitted": _fitted(answer),
         "open": not answer.title or answer.adequate is False or bool(sentences.worst_run(answer)),
         "law": _typeset(answer),
         "constants": [
@@ -57,7 +58,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "shifts": shifts,
         "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
         "suspected": sentences.SUSPECTED.lower() + clock,
-        "expected": sentences.errors(answer) if answer.title else (),
+        "expected": errors(answer) if answer.title else (),
         "copies": (copies := _copies(answer) if answer.title else []),
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "missing": _not_there(copies),
@@ -66,10 +67,20 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
+def _fitted(answer: Answer) -> str:
+    """Return in which flows constants were fitted, and at which temperature times hold."""
+    if not any(one.ci95 for one in answer.constants):
+        return ""
+    at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
+    return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
+
+
 def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is possible."""
-    at_end = "at its physical limit" if one.at_limit else one.near_end
-    return "; ".join(filter(None, [one.said, at_end, "may be absent" * one.may_be_absent]))
+    poor = sentences.POORLY * (one.determined and one.is_poor)
+    end = "at its physical limit" * one.at_limit
+    width = "may be infinite, without effect" if one.may_be_absent else poor
+    return "; ".join(filter(None, [one.said, end, width]))
 
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
@@ -149,24 +160,26 @@ def _law(equation: Equation, rest: bool = False) -> str:
             one.equation.replace("_k", index) + _at_rest(one.states, part.own)
             for one, part in zip(equation.spelled_states, equation.states, strict=True)
         ]
-        return text + _formulas(_scaled_once(parts))
+        return text + _formulas(_factors_first(parts))
     except InputError:  # nobody said how a law of their own is written
         return ""
 
 
-_SCALED = re.compile(r"(\S+) \\to (.+?)(?:\\,)?\s*\1")
-
-
-def _scaled_once(equations: Sequence[str]) -> list[str]:
-    """Return equations of states, with one product for what several of them scale."""
-    parted = [one.partition(r",\quad") for one in equations]
-    found = [_SCALED.fullmatch(first) for first, _, _ in parted]
-    scaled = {one[1] for one in found if one}
-    if len(scaled) != 1 or not all(found) or len(found) < 2:
-        return list(equations)
-    product = r"\,".join(one[2] for one in found if one)
-    (what,) = scaled
-    return [rf"{what} \to {product}\,{what}", *(rest for _, _, rest in parted)]
+def _factors_first(equations: Sequence[str]) -> list[str]:
+    """Return equations of states behind what these multiply, each with its factors, in words."""
+    factors: dict[str, list[str]] = {}
+    rest = []
+    for one in equations:
+        first, _, others = one.partition(r",\quad")
+        what, arrow, product = first.partition(r" \to ")
+        if arrow:
+            factor = re.sub(rf"(?:\\,)?\s*{re.escape(what)}", "", product, count=1)
+            factors.setdefault(what, []).append(factor.strip())
+        rest.append(others if arrow else one)
+    said = [
+        rf"{what}\ \mathrm{{is\ multiplied\ by}}\ " + r"\,".join(f) for what, f in factors.items()
+    ]
+    return [r",\quad".join(said), *rest] if said else rest
 
 
 def _at_rest(states: Sequence[str], effect: StateEffect) -> str:

@@ -47,15 +47,17 @@ def write_loop(
     Returns the page. `summary`: the data and declared model in words. `run`: what the page says of
     the run that made it, where that was no command. `conditions`: material and temperature.
     """
-    pictures = [
-        waterfall_picture(result),
-        runs_picture(result),
-        lissajous_picture(result),
-        free_form_picture(result),
-        residual_picture(result),
-        by_mode_picture(result.by_mode, result.verdict == "unexplained"),
-        next_test_picture(result),
-    ]
+    pictures = [runs_picture(result)]
+    if result.verdict != "no_signal":
+        pictures = [
+            waterfall_picture(result),
+            *pictures,
+            lissajous_picture(result),
+            free_form_picture(result),
+            residual_picture(result),
+            by_mode_picture(result.by_mode, result.verdict == "unexplained"),
+            next_test_picture(result),
+        ]
     drawn = [p for p in pictures if p is not None]
     for one in drawn:
         folder.write(f"figures/{safe_name(one.name)}.svg", one.svg)

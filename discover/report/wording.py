@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from markupsafe import Markup, escape
 
@@ -71,12 +71,6 @@ def percent_range(values: Sequence[float | None] | None) -> str:
     text = f"{low.removesuffix(' %')} to {high}" if low != high else ""
     parts = [text, "" if len(told) == len(values) else lost]
     return f" ({'; '.join(filter(None, parts))})" if any(parts) else ""
-
-
-def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> float | None:
-    """Return the largest error of a quantity over flows."""
-    values = [v for row in errors.values() if (v := row[quantity]) is not None and known(v)]
-    return max(values, default=None)
 
 
 def terms_text(outcome: LearnerOutcome) -> str:

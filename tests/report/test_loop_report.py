@@ -130,7 +130,7 @@ def test_the_page_says_which_modes_the_data_leave_open(tmp_path, no_pictures):
     assert "α (varies from mode to mode) at λ = 2 s" in page
     caption = page[page.index('<figure id="by_mode">') :]
     assert "(evidence over one constant: 12)" in caption
-    assert "no constants of the fluid" in caption
+    assert "these values come nearest" in caption
     (written,) = json.loads((tmp_path / "loop.json").read_text())["stages"]
     assert written["parameters"]["alpha"]["modes"][1]["ci95"] is None
 
@@ -194,6 +194,17 @@ def test_what_is_less_probable_than_not_is_not_said_to_explain_the_data():
     assert "Probability" not in said_of(0.99, stress_gain=0.99)
     # in all that fits alike, of which no set has half
     assert "with it the data are fitted to the noise." in said_of(0.44, stress_gain=0.86)
+
+
+def test_where_no_law_is_given_no_model_and_no_band_is_drawn():
+    result = loop_result()
+    banded = tuple(replace(r, band=np.stack([r.measured, r.measured])) for r in result.records)
+    law = replace(result, records=banded)
+    for verdict, drawn in (("effects_added", True), ("no_signal", False)):
+        picture = runs_picture(replace(law, verdict=verdict))
+        for said in ("starting model", "95 % prediction band", "1 %"):
+            assert (said in picture.svg) is drawn
+        assert ("predicted" in picture.caption) is drawn
 
 
 def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():

@@ -296,6 +296,9 @@ def test_a_picture_says_which_quantity_is_not_determined(comparison):
     assert comparison.undetermined == ["N2"]
     (flow, *_) = (f for f in comparison.flows if f.kind == "test" and f.oscillatory)
     said = "not determined by these data"
-    assert texts_of(flow_picture(comparison, flow).svg).count(said) == 1
+    drawn = flow_picture(comparison, flow)
+    assert texts_of(drawn.svg).count(said) == 1
+    assert comparison.placement(flow).text in drawn.caption
+    assert f"{flow.title}, beyond range" in texts_of(drawn.svg)
     decided = replace(comparison, statements=())
     assert said not in texts_of(flow_picture(decided, flow).svg)

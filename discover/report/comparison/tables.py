@@ -14,16 +14,8 @@ from discover.equations import Equation
 from discover.equations.spelling.markup import law_element, sum_elements
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
-from discover.protocols.kinematics import in_words as quantities_in_words
 from discover.report.plots.style import learner_colour
-from discover.report.wording import (
-    known,
-    learner_as_subject,
-    percent,
-    sentence,
-    terms_text,
-    worst,
-)
+from discover.report.wording import known, learner_as_subject, percent, sentence, terms_text
 
 
 def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
@@ -231,7 +223,9 @@ def learner_lines(comparison: Comparison) -> list[str]:
 
 def _parts(comparison: Comparison, name: str, outcome: LearnerOutcome) -> Iterator[str]:
     yield _of_learner(comparison, name, outcome)
-    yield from _unseen(comparison, name)
+    lost = [flow.title for flow in comparison.judged if outcome.predictions[flow.key] is None]
+    if lost:
+        yield f"{learner_as_subject(name)} diverges in {words.listed(lost)}"
     apart = {q: off for q, off in comparison.disagreement.items() if off > _DIFFERS}
     if name == "tbnn_ude" and apart:
         told = [f"{words.readable(q)} by {words.percent_of(off)}" for q, off in apart.items()]
@@ -256,26 +250,3 @@ def _of_learner(comparison: Comparison, name: str, outcome: LearnerOutcome) -> s
     share = comparison.shares.get(name, 0.0)
     chance = f" (probability {percent(share)})" if share else ""
     return f"{who} finds {terms_text(outcome)}{chance}{missed}"
-
-
-def _unseen(comparison: Comparison, name: str) -> list[str]:
-    """Return what becomes of a law in flows that no fit saw, inside the range and beyond."""
-    predictions, parts, lost = comparison.outcomes[name].predictions, [], []
-    for inside, where in ((True, "inside the fitted range"), (False, "beyond it")):
-        flows = [f for f in comparison.judged if comparison.placement(f).inside is inside]
-        lost += [flow.title for flow in flows if predictions[flow.key] is None]
-        errors = {flow.name: comparison.errors(name, flow) for flow in flows}
-        recorded = quantities_in_words(flow.protocol.quantity for flow in flows)
-        said = [
-            f"{symbol} by up to {percent(value)}"
-            for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2 (of N1)", "N2"))
-            if (value := worst(errors, quantity)) is not None
-        ]
-        if said:
-            parts.append(f"{words.listed(said)} {where}")
-    told = []
-    if parts:
-        told.append(f"{learner_as_subject(name)} misses unseen flows: {'; '.join(parts)}")
-    if lost:
-        told.append(f"{learner_as_subject(name)} diverges in {words.listed(lost)}")
-    return told

@@ -76,7 +76,8 @@ def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
                 _frame(panel, comparison, flow, quantity, last)
             row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
         axes[-1, 0].set_xlabel(time_label)
-        axes[0, 0].set_title(look.literal(flow.title))
+        beyond = "" if comparison.placement(flow).inside else ", beyond range"
+        axes[0, 0].set_title(look.literal(flow.title) + beyond)
         for column, (kind, (_, label)) in enumerate(closed.items(), 1):
             axes[0, column].set_title(f"{kind} Lissajous curve, last cycle")
             axes[-1, column].set_xlabel(label)
@@ -84,7 +85,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
         return look.picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {seen} "
+            f"{flow.title}: {seen} It lies {comparison.placement(flow).text}. "
             "Left, stresses against time; beyond the times shaded grey the prediction runs past "
             "the length of the training series. Middle and right, the last cycle against strain "
             "and against shear rate. Shaded in orange is the 95 % band of all laws "

@@ -159,28 +159,11 @@ def by_mode_picture(
         label = look.literal(readable(effect_title(name)))
         settings = {"xscale": "log", "xlabel": "relaxation time (s)", "ylabel": label}
         panels.append(look.Panel(curves, settings, bands))
-    said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
-    doubt = ""
-    if is_unexplained:
-        doubt = (
-            " The data are not explained, so these are the values that come nearest, and no "
-            "constants of the fluid."
-        )
-    caption = f"{said}{doubt} Intervals take it that the law is the fluid's."
+    said = " ".join(
+        f"{readable(effect_title(name))} is free in each mode (evidence over one constant: "
+        f"{significant(one.evidence[-1], 2)}); its values stand with the modes."
+        for name, one in constants.items()
+    )
+    nearest = " The law leaves more than noise: these values come nearest." * is_unexplained
+    caption = f"{said}{nearest} Intervals take it that the law is the fluid's."
     return look.row_of_panels("by_mode", caption, panels, 9.0, 2.8)
-
-
-def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
-    """Return what the data say of a constant by mode."""
-    symbol = readable(effect_title(name))
-    gain = significant(constant.evidence[-1], 2)
-    text = f"{symbol} is free in each mode that the runs tell (evidence over one constant: {gain})"
-    known = [mode for mode in constant.modes if not mode.left_open]
-    if not known:
-        return f"{text}, and not determined by these data in any mode."
-    parts = [f"{significant(m.value, 2)} at {significant(m.relaxation_time_s, 2)} s" for m in known]
-    open_ones = [significant(m.relaxation_time_s, 2) for m in constant.modes if m.left_open]
-    text = f"{text}: {', '.join(parts)}."
-    if open_ones:
-        text += f" Not determined by these data in the modes of {', '.join(open_ones)} s."
-    return text

@@ -63,13 +63,21 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
 
 
 def runs_picture(result: LoopResult) -> look.Picture:
-    """Return every run: measured, the law as declared, and with effects."""
-    records = result.records
+    """Return every run: measured, the law as declared, and with effects; without a law measured."""
+    records, predicted = result.records, " and predicted"
+    if result.verdict == "no_signal":
+        records, predicted = (
+            [
+                replace(r, predicted=r.predicted[:0], errors=r.errors[:0], band=None)
+                for r in records
+            ],
+            "",
+        )
     with drawn_runs(records) as drawing:
         return look.picture(
             drawing,
             "runs",
-            "Measured and predicted, run by run."
+            f"Measured{predicted}, run by run."
             + _OF_BAND * any(r.band is not None for r in records)
             + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
             + _what_is_drawn(records),
@@ -101,7 +109,7 @@ def drawn_runs(
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None), names)
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
-            low, high = min(low, float(shown.min())), max(high, float(shown.max()))
+            low, high = float(np.min(shown, initial=low)), float(np.max(shown, initial=high))
             margin = 0.05 * (high - low) or 1.0
             panel.set_ylim(low - margin, high + margin)
             if through_decades(record):
@@ -140,7 +148,7 @@ def draw_run(
         look.shade_between(panel, along[shown], *record.band[:, shown], **style)
     style = {"ms": 2.5, "mfc": "none", "mew": 0.7, "color": look.TRUTH, "label": "measured"}
     panel.plot(along[marked], record.measured[marked], "o", **style)
-    if names[0]:
+    if names[0] and len(record.predicted):
         style = {"lw": 1.1, "color": look.BEFORE, "label": names[0]}
         panel.plot(along[shown], record.predicted[0][shown], "-.", **style)
     if len(record.predicted) > 1 or not names[0]:

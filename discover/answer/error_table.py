@@ -1,0 +1,102 @@
+"""Table of errors: what unseen runs measured, then what nothing tested and laws differ by."""
+
+from typing import Any, NamedTuple
+
+from discover.answer.sentences import SYMBOLS, at_most, worst_run
+from discover.words import percent_of
+
+
+class Row(NamedTuple):
+    """Quantity, on what its numbers rest, and these in the range and beyond.
+
+    `beyond`: None where `inside` says of both why there is no number.
+    """
+
+    symbol: str
+    note: str
+    inside: str
+    beyond: str | None = ""
+    beyond_at: str = ""
+
+
+class Errors(NamedTuple):
+    """Rows under one heading, and the headings of their numbers."""
+
+    title: str
+    heads: tuple[str, str]
+    rows: list[Row]
+
+    @property
+    def text(self) -> str:
+        """The rows as text goes on."""
+        told = []
+        for row in self.rows:
+            inside, at = f"{row.inside} ({row.note})", f" ({row.beyond_at})" * bool(row.beyond_at)
+            beyond = f"{self.heads[1]} {row.beyond}{at}" if row.beyond else ""
+            cells = filter(None, [inside.removesuffix(" ()"), beyond])
+            told.append(f"{row.symbol} {', '.join(cells)}")
+        return f"{self.title}: {'; '.join(told)}."
+
+
+def errors(answer: Any) -> list[Errors]:
+    """Return errors of unseen runs, with the worst and the best classical law; then the untested.
+
+    Quantities of which nothing is known for the same reason share a row.
+    """
+    measured, by_law, apart = [], [], False
+    for name, symbol in SYMBOLS.items():
+        one = answer.expected(name)
+        near, far = ("" if value is None else at_most(value) for value in one.spread)
+        if one.is_measured and (one.inside is not None or (one.is_known and not far)):
+            beyond, at = "not measured", ""
+            if one.beyond is not None and not far:
+                beyond, at = at_most(one.beyond), one.beyond_at
+            measured.append(Row(symbol, _note(answer, one), _inside(answer, one), beyond, at))
+        if near or far:
+            apart = True
+            by_law.append(Row(symbol, one.note * bool(near), near, far))
+        elif not one.is_known:
+            row = Row(symbol, one.note, one.missing, None)
+            if by_law and by_law[-1] == row._replace(symbol=by_law[-1].symbol):
+                row = row._replace(symbol=f"{by_law.pop().symbol}, {symbol}")
+            by_law.append(row)
+    if (worst := worst_run(answer)) is not None:
+        measured.insert(1, Row("worst run in range", *worst))  # below σ12
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        measured.append(Row("best classical law", near, percent_of(error)))
+    if answer.falls_above:
+        told = f"falls above {answer.falls_above}"
+        by_law.append(Row("steady flow curve", "of this law", told, None))
+    untested = (_BY_LAW, (_INSIDE, _TWICE)) if apart else ("Untested", ("", ""))
+    blocks = Errors(_title(answer), (_INSIDE, "beyond"), measured), Errors(*untested, by_law)
+    return [one for one in blocks if one.rows]
+
+
+_INSIDE = "in\N{NO-BREAK SPACE}range"
+_BY_LAW, _TWICE = "Untested; equally good laws differ by", "at twice the highest rate"
+
+
+def _title(answer: Any) -> str:
+    """Return what the errors are, and the noise that they do not hold."""
+    of = "Residual of the fitted" if answer.expected("sigma12").is_residual else "Error on unseen"
+    noise = f" besides {_noise(answer)} of {percent_of(answer.noise)}" if answer.noise else ""
+    return f"{of} runs{noise}"
+
+
+def _noise(answer: Any) -> str:
+    return "scatter" if answer.range.steady else "noise"
+
+
+def _note(answer: Any, one: Any) -> str:
+    """Return on what an error rests, and that it is more than the tolerance."""
+    missed = "above tolerance" * ((one.inside or 0.0) > answer.tolerance)
+    return ", ".join(filter(None, [one.note, missed]))
+
+
+def _inside(answer: Any, one: Any) -> str:
+    """Return the error in the range; of what the verdict calls noise, that it is."""
+    if one.inside is None:
+        return "no data"
+    is_noise = not one.inside or (one.is_residual and answer.fits_to_the_noise)
+    return f"within {_noise(answer)}" if is_noise else at_most(one.inside)
