@@ -10,6 +10,7 @@ import pandas as pd
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.records import Record
 from discover.dataset.importing.text_export import Block
+from discover.dataset.importing.which_test import Recognised
 from discover.dataset.load import INDEX_FILE, TESTS_FILE
 from discover.dataset.tables.table import shown
 
@@ -139,6 +140,42 @@ def unread_columns(columns: Sequence[tuple[str, str]]) -> Iterator[str]:
             f"{', '.join(files[:3])}{more}: columns not read: {names}. To have one, say what "
             'it is, as in --column N1="its name".'
         )
+
+
+_WORDS = {
+    "frequency_sweep": "a frequency sweep at small strain",
+    "amplitude_sweep": "an amplitude sweep",
+    "flow_curve": "a flow curve, of steady states",
+    "relaxation": "relaxation after a step of strain",
+    "creep": "a test at a given stress",
+    "run": "a transient, such as start-up",
+}
+THROUGH = {
+    "viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor",
+    "stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2",
+}  # fmt: skip
+"""Quantities that are read only where they have to stand for another."""
+
+
+def summary(where: str, readings: Readings, one: Recognised, made: Record, said: list[str]) -> str:
+    """Say what a block was taken for, and its columns unless they were among what was `said`."""
+    used = (f"{key} = {words}" for key, words in readings.used.items() if is_part(key, made))
+    understood = ", ".join(used)
+    columns = "columns as before" if understood in said else understood
+    said.append(columns)
+    rows = len(next(iter(made.table.values())))
+    text = f"{where}: read as {_WORDS[made.kind]} ({one.why}); {columns}; {rows} rows"
+    text += f", {made.dropped} without all these numbers left out" if made.dropped else ""
+    return "; ".join([text, *made.notes]) + "."
+
+
+def is_part(key: str, made: Record) -> bool:
+    """Return whether a quantity that was read went into the table, by itself or through another."""
+    if key == "strain_amplitude":
+        return made.kind == "amplitude_sweep"
+    if key == "strain":
+        return "strain" in made.table or "step_strain" in made.conditions
+    return key in made.table or key in THROUGH | {INSTRUMENT.get(name) for name in made.table}
 
 
 def left_out(where: str, block: Block, reason: str) -> str:
