@@ -60,7 +60,7 @@ class ModeSearch:
 
     Non-negative least squares on a fine grid of times finds the most modes that the sweep supports
     [Lawson & Hanson 1974]. Their times are then fitted jointly, and modes merged or left out one by
-    one, the least missed first, down to one. Solvent and elastic constant are with and without.
+    one, the least missed first; solvent and elastic constant with and without.
     """
 
     frequency: Float[np.ndarray, " n"]  # in rad/s

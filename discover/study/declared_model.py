@@ -240,8 +240,7 @@ def _spectrum_of(
 ) -> RelaxationSpectrum | None:
     """Return the spectrum that the modes of a result come from; None if they are not the sweep's.
 
-    A result holds modes without their errors, which intervals and verdicts have to allow for. One
-    factor on all times, or on all moduli, may have been fitted.
+    One factor on all times, or on all moduli, may have been fitted.
     """
     times = np.array(found.equation.relaxation_time)
     if dataset.linear_sweep is None:
@@ -281,8 +280,8 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
 def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
     """Return a modulus in Pa and a relaxation time in s of the right order from the runs.
 
-    The time is a tenth of the median duration, or the inverse of a flow curve's middle rate or a
-    sweep's middle frequency; the modulus is the largest stress over rate times that.
+    The time is a tenth of the median duration, or the inverse of a middle rate or frequency; the
+    modulus is the largest stress over rate times that.
     """
 
     def slowest(run: Run) -> float:

@@ -72,8 +72,7 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
 def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     """Return a `Fluid` as the declared model of a study.
 
-    None is that of the data's linear sweep, whose error is then known, and without a sweep Maxwell
-    with G = 1 Pa and λ = 1 s.
+    None is that of the data's linear sweep, or without one Maxwell with G = 1 Pa and λ = 1 s.
     """
     if base is None and data.linear_sweep is not None:
         base = Fluid.from_sweep(data.linear_sweep)
@@ -115,8 +114,8 @@ def with_known(
 ) -> StudyModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
-    `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
-    InputError if an effect, a value or a constant is not as it should be.
+    `effects`: as ``[model] effects``. `by_mode`: which may differ from mode to mode. InputError
+    if an effect, a value or a constant is not as it should be.
     """
     for option, names in (("free", free), ("by_mode", by_mode)):
         if isinstance(names, str):

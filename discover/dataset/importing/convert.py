@@ -41,12 +41,9 @@ class ImportedFolder:
 def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
     """Return the data folder that exports hold, in SI units.
 
-    A block of numbers is taken for the test that its quantities and their course make it: records
-    in time become runs, sweeps and flow curves the tables beside them. Rows without a needed number
-    are dropped and counted. A file that cannot be understood is named in `unread`.
-
-    `mapping`: what is known; the rest is found from names, units and numbers. Raises InputError if
-    no file can be understood.
+    Records in time become runs, sweeps and flow curves the tables beside them. Rows without a
+    needed number are dropped and counted. `mapping`: what is known; the rest is found from names,
+    units and numbers. Raises InputError if no file can be understood; else `unread` names such.
     """
     if not paths:
         raise InputError(

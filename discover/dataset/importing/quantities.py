@@ -60,8 +60,7 @@ _SHORT = 3  # letters of a name that says too little without its unit
 def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
     """Return the place of each quantity among the columns of a block that hold a number.
 
-    A clock is a time only if no number is. `given`: names of columns that the user gave; they win.
-    Raises InputError if one stands above two columns.
+    `given`: names that the user gave; they win. Raises InputError if one stands above two columns.
     """
     names = [name for name, _ in block.columns]
     found: dict[str, int] = {}
@@ -189,11 +188,7 @@ class UnsaidUnit(NamedTuple):
 
 
 def unsaid_unit(key: str, column: str, raw: Values, get: Get) -> UnsaidUnit:
-    """Return the unit of a column without one.
-
-    `get`: gives other columns of the block in SI units, None where it has no such column. An
-    angular frequency is one in rad/s, a frequency may count.
-    """
+    """Return the unit of a column without one; `get` gives other columns in SI units, or None."""
     choices = _CHOICES.get(key)
     if choices is None or (key == "omega" and "frequency" not in tables_of(column)):
         return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")

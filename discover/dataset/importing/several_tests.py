@@ -355,7 +355,7 @@ def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) ->
     """Return numbered blocks of a file, those that are intervals of one thixotropy test as one.
 
     Words say that they are, or three rates of which the last is the first again, or rates that go
-    up and then down with stresses that differ. A block that the user names a test for is left.
+    up and then down with stresses that differ.
     """
     left, found = list(blocks), []
     while left:
@@ -450,9 +450,8 @@ _FEWEST_OF_WAVE = 32
 def waves_of(readings: Readings) -> Iterator[Block]:
     """Yield the waveforms that stand beside the summary of an oscillation, a block for each point.
 
-    Time is counted from the first sample. Where the export gives none, the samples are whole cycles
-    at the frequency of the point, closed with the first sample, and the rate is the derivative of
-    the Fourier series, without harmonics that are noise.
+    Without a time the samples are whole cycles at the frequency of the point, closed with the first
+    sample, and the rate is the derivative of the Fourier series, without harmonics that are noise.
     """
     strain, stress = readings.alone("strain_wave"), readings.alone("stress_wave")
     if strain is None or stress is None:

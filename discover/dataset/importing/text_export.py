@@ -2,9 +2,8 @@
 
 One reader serves plain tables, TRIOS (text, CSV, "Export to LIMS" and spreadsheets; blocks headed
 ``[step]``), RheoCompass (``Interval data:``), rSpace and RheoWin: all are a line of names, perhaps
-a line of units, then lines of numbers, some of which begin with a word. What a block is called is
-read from the lines above it, or is that word. hermes-rheo 2.0.0 reads TRIOS' four lines alone, pins
-older scipy, pandas and matplotlib and brings piblin, mastercurves, openpyxl and numdifftools along.
+a line of units, then lines of numbers, some of which begin with a word. hermes-rheo 2.0.0 reads
+TRIOS' four lines alone, and pins older scipy, pandas and matplotlib.
 """
 
 import re
@@ -119,7 +118,6 @@ def require_blocks(blocks: list[Block], name: str) -> list[Block]:
 def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     """Return the blocks of numbers among the cells of each line, with decimal points.
 
-    Lines that begin with a word, such as the number of a segment, are a block for each word.
     `header_row`: line of the names, where it is not that above the numbers; then one block.
     """
     blocks: list[Block] = []

@@ -38,10 +38,9 @@ def is_clock(cell: str) -> bool:
 
 
 def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
-    """Return readings of a clock in s, nan where a cell is none.
+    """Return readings of a clock in s, nan where a cell is none; past midnight they go on.
 
-    Clocks of the day and time stamps count from the first, since they are later than the whole
-    record is long; past midnight they go on. `unit`: as the export writes it, such as ``hh:mm``.
+    Clocks of the day and time stamps count from the first. `unit`: as written, such as ``hh:mm``.
     """
     matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
@@ -104,8 +103,7 @@ def read_rows(
 ) -> list[list[str]]:
     """Return the cells of every line of a text file, numbers with decimal points.
 
-    What is None is found from the file. Raises InputError if it cannot be read, or a decimal comma
-    may be of thousands.
+    Raises InputError if it cannot be read, or a decimal comma may be of thousands.
     """
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()

@@ -1,8 +1,7 @@
 """Which test a block of numbers is, by words and by numbers, before any of it is used.
 
-What words say of the test is believed before the numbers are asked; where the two exclude each
-other nothing is taken. Numbers tell what was imposed by its course: a command is held, in one step
-or several, or follows a straight line, and an answer does neither.
+What words say is believed first; where numbers exclude it nothing is taken. Numbers tell what was
+imposed by its course: a command is held, in steps or not, or goes straight; an answer does neither.
 """
 
 import re
