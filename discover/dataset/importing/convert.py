@@ -10,17 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from discover.dataset.importing import folder_files, quantities
+from discover.dataset.importing.across_blocks import joined_intervals, waves_of
 from discover.dataset.importing.files import blocks_of_importer
 from discover.dataset.importing.mapping import Mapping, Source, TestName
 from discover.dataset.importing.names import alternatives
 from discover.dataset.importing.readings import SAME, Readings
 from discover.dataset.importing.records import Record, clock_before, joined, record
-from discover.dataset.importing.several_tests import (
-    joined_intervals,
-    tests_in_rows,
-    tests_side_by_side,
-    waves_of,
-)
+from discover.dataset.importing.several_tests import tests_in_rows, tests_side_by_side
 from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import read_rows
 from discover.dataset.importing.which_test import Recognised, recognise
