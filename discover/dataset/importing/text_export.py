@@ -94,7 +94,8 @@ class Block:
     def rows(self, chosen: Sequence[int] | np.ndarray) -> "Block":
         """Return the block of some rows, with what is read of them already."""
         kept = [int(i) for i in chosen]
-        part = replace(self, cells=tuple(self.cells[i] for i in kept))
+        line = self.line + (kept[0] if kept else 0)
+        part = replace(self, cells=tuple(self.cells[i] for i in kept), line=line)
         part.__dict__["numbers"] = self.numbers[:, kept]
         return part
 
