@@ -65,11 +65,14 @@ def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
     if not found:
         raise InputError(f"None of the {len(paths)} files can be read. {' '.join(unread[:6])}")
     names: dict[str, dict[str, None]] = {}  # of the columns that tests need, by quantity
-    for key, name in chain.from_iterable(one.columns for one in found):
-        names.setdefault(key, {})[name] = None
     units: quantities.UnsaidUnits = {}
-    for key, pair in chain.from_iterable(one.units.items() for one in found):
-        units.setdefault(key, pair)
+    for readings, made in (pair for one in found for pair in one.taken):
+        for key, at in readings.columns.items():
+            if key in readings.used:
+                names.setdefault(key, {})[readings.block.columns[at][0]] = None
+        for key, unit in readings.unsaid.items():
+            if folder_files.is_part(key, made):
+                units.setdefault((key, unit.column), (readings.name, unit))
     idle = _unused_options(mapping, found, names.keys())
     quantities.require_units(units)
     files, notes = folder_files.files_of([made for one in found for made in one.records])
@@ -96,11 +99,9 @@ class _File:
     said: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
     tests: dict[str, TestName] = field(default_factory=dict)  # by file and block
-    columns: list[tuple[str, str]] = field(default_factory=list)  # quantities of tests, their names
+    taken: list[tuple[Readings, Record]] = field(default_factory=list)  # of the tests
     unused: list[tuple[str, str]] = field(default_factory=list)  # names of columns, and the file
     named: set[str] = field(default_factory=set)  # quantities that some block names
-    needed: set[str] = field(default_factory=set)  # quantities that some test needs
-    units: quantities.UnsaidUnits = field(default_factory=dict)
 
 
 def _unused_options(mapping: Mapping, found: Sequence[_File], needed) -> list[str]:
@@ -119,7 +120,8 @@ def _unused_options(mapping: Mapping, found: Sequence[_File], needed) -> list[st
             f"{unknown[0]}. Known are {', '.join(sorted(named))}; name another with "
             f'--column {unknown[0]}="its name", or leave the unit out.'
         )
-    idle = mapping.units.keys() - set().union(_WAVES, *(one.needed for one in found))
+    used = set().union(_WAVES, *(readings.used for one in found for readings, _ in one.taken))
+    idle = mapping.units.keys() - used - {SAME[key] for key in used if key in SAME}
     return [
         f"warning: --unit {key} changes nothing: no test that was read needs {key}."
         for key in sorted(idle)
@@ -193,14 +195,15 @@ def _read(path: Path, mapping: Mapping) -> _File:
                 made.name, found.tests[key], before = name, made.kind, made
                 made.notes += [readings.note] if readings.note else []
                 found.records.append(made)
-                _note(found, readings, made)
+                found.taken.append((readings, made))
                 found.said.append(folder_files.summary(where, readings, one, made, understood))
                 # what another column says already is known, though it is not used
                 known = (readings.used.keys() | folder_files.THROUGH) & readings.columns.keys()
                 read |= {block.columns[readings.columns[k]][0] for k in known}
                 read |= set(block.told_by)
                 there |= dict.fromkeys(readings.numbered())
-        for wave in waves_of(readings) if chosen != "none" else ():
+        again = Readings.of(block, readings.mapping, file)  # a wave is no part of that test
+        for wave in waves_of(again) if chosen != "none" else ():
             # in SI units already, whatever the user says of the file's
             of_wave = Readings.of(wave, Mapping(), file)
             one = recognise(of_wave)
@@ -216,16 +219,6 @@ def _read(path: Path, mapping: Mapping) -> _File:
 
 
 _WAVES = {"strain_wave", "stress_wave", "wave_time"}
-
-
-def _note(found: _File, readings: Readings, made: Record) -> None:
-    """Keep what a test that is imported says of names and units."""
-    used, names = readings.used.keys(), readings.block.columns
-    found.columns += [(key, names[at][0]) for key, at in readings.columns.items() if key in used]
-    found.needed |= used | {SAME[key] for key in used if key in SAME}
-    for key, unit in readings.unsaid.items():
-        if folder_files.is_part(key, made):
-            found.units.setdefault((key, unit.column), (readings.name, unit))
 
 
 _CALIBRATION = re.compile(alternatives("lines")["calibrations"], re.IGNORECASE)

@@ -138,7 +138,9 @@ def record(readings: Readings, found: Recognised, before: Record | None) -> Reco
     elif made.kind == "relaxation" and made.is_run:
         _after_step(made)
     elif made.kind == "creep" and made.is_run:
-        made = _answered(made)
+        if "strain" not in made.table:
+            made.notes.append("the strain is the integral of the rate from t = 0 on")
+        made.table, made.conditions["control"] = _with_strain(made.table), "stress"
     if made.kind in ("run", "creep") and "stress" in made.table:
         _note_alternation(made)
     temperature = readings.get("temperature")
@@ -204,20 +206,6 @@ def _note_alternation(made: Record) -> None:
         made.notes.append("its cycles repeat from the first sample on: periodic steady state")
     else:
         made.notes.append("taken as an oscillation that starts from rest")
-
-
-def _answered(made: Record) -> Record:
-    """Return a test at a given stress, with the recovery that follows in the same block."""
-    if "strain" not in made.table:
-        made.notes.append("the strain is the integral of the rate from t = 0 on")
-    # the clock of a recovery may start again
-    starts = np.flatnonzero(np.diff(made.table["time"]) < -0.5 * made.table["time"][:-1]) + 1
-    pieces = zip(*(np.split(v, starts) for v in made.table.values()), strict=True)
-    first, *others = (_with_strain(dict(zip(made.table, p, strict=True))) for p in pieces)
-    made.table, made.conditions["control"] = first, "stress"
-    for other in others:
-        made = _followed(made, other)
-    return made
 
 
 def _with_strain(table: Table) -> Table:
