@@ -8,7 +8,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +56,6 @@ class Table:
         names = [shown(column) for column in self.columns]
         more = f" and {len(names) - 12} more" if len(names) > 12 else ""
         return ", ".join(names[:12]) + more
-
-    def rows(self, chosen: Sequence[int]) -> "Table":
-        """Return the table of some rows, counted from 0."""
-        columns = {name: [cells[i] for i in chosen] for name, cells in self.columns.items()}
-        return replace(self, columns=columns, lines=[self.lines[i] for i in chosen])
 
     def numbers(self, column: str, factor: float = 1.0) -> Float[np.ndarray, " n"]:
         """Return a column times a factor, what is next to nothing as 0; InputError if no number."""
