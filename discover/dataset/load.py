@@ -282,18 +282,8 @@ def from_dataframe(
         raise InputError(f"tables must be a mapping of names to tables; got {short(tables)}.")
     if not isinstance(name, str):
         raise InputError(f"The name of a data set must be text; got {short(name)}.")
-    for label, table in [("samples", samples), ("runs", runs), *(tables or {}).items()]:
-        if not (table is None or isinstance(table, pd.DataFrame)):
-            raise InputError(f"{label} must be a pandas DataFrame; got a {type(table).__name__}.")
-    samples, runs = (one if one is None else _flat(one) for one in (samples, runs))
-    tables = {kind: _flat(table) for kind, table in (tables or {}).items()}
-    for label, table in [("samples", samples), ("runs", runs), *tables.items()]:
-        odd = [] if table is None else [one for one in table.columns if not isinstance(one, str)]
-        if odd:
-            raise InputError(
-                f"The columns of {label} must have text for names, on one level; got "
-                f"{short(odd[0])}. Rename them, or flatten them with reset_index()."
-            )
+    samples, runs = (_plain(label, one) for label, one in (("samples", samples), ("runs", runs)))
+    tables = {kind: _plain(kind, table) for kind, table in (tables or {}).items()}
     known = [*signature(_read_folder).parameters][2:]
     if no_option := [one for one in options if one not in known]:
         raise InputError(unknown_name("option", no_option[0], known, "from_dataframe"))
@@ -313,8 +303,17 @@ def from_dataframe(
         return _read_folder(Path(folder), name, **options)
 
 
-def _flat(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with the named levels of its index as columns."""
+def _plain(label: str, table: pd.DataFrame | None) -> Any:
+    """Return a table with the named levels of its index as columns; InputError if it is none."""
+    if not (table is None or isinstance(table, pd.DataFrame)):
+        raise InputError(f"{label} must be a pandas DataFrame; got a {type(table).__name__}.")
+    if table is None:
+        return None
+    if odd := [one for one in table.columns if not isinstance(one, str)]:
+        raise InputError(
+            f"The columns of {label} must have text for names, on one level; got {short(odd[0])}. "
+            "Rename them, or flatten them with reset_index()."
+        )
     named = [n for n in table.index.names if isinstance(n, str) and n not in table.columns]
     return (table.reset_index(level=named) if named else table).reset_index(drop=True)
 
