@@ -244,19 +244,21 @@ def spectrum_of_modes(
 ) -> RelaxationSpectrum | None:
     """Return the spectrum of a sweep that has these modes, whose errors it knows; None if none has.
 
-    `solvent` in Pa s, `times` in s and `modulus` in Pa, shape (k,). Without moduli one factor on
-    all times, or on all moduli, may have been fitted.
+    `solvent` in Pa s, `times` in s and `modulus` in Pa, shape (k,). One factor on all times may
+    have been fitted, and without moduli one on these.
     """
     asked: tuple[dict[str, Any], ...]
     asked = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
-    for options in asked if sweep is not None else ():
+    if sweep is None:
+        return None
+    for options in asked:
         with suppress(InputError):  # too short a sweep, of which the modes are not then
             found = relaxation_spectrum(sweep, **options)
             if found.relaxation_time.shape != times.shape:
                 continue
             factor = times / found.relaxation_time
-            exact = np.all(factor == 1.0) and np.array_equal(found.modulus, modulus)
-            if np.ptp(factor) <= _SAME_MODES * np.max(factor) and (modulus is None or exact):
+            same = modulus is None or np.array_equal(found.modulus, modulus)
+            if same and np.ptp(factor) <= _SAME_MODES * np.max(factor):
                 return found
     return None
 

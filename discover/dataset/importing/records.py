@@ -37,18 +37,16 @@ class _Needed(NamedTuple):
     why: str = ""  # of rows where something is not positive
 
 
-_NORMAL, _MODULI = ("N1", "N2"), ("Gp", "Gpp")
+_NORMAL, _STEADY = ("N1", "N2"), ("shear_rate", "stress")
+_SWEEP, _SIZE = ("omega", "Gp", "Gpp"), ("strain_amplitude",)
+_MODULUS, _COMPLIANCE = ("time", "relaxation_modulus"), ("time", "compliance")
 _NO_MODULUS = "a modulus that is not positive, beyond the reach of the instrument"
 # of one kind that counts of which least is lacking, the first of several
 _NEEDED = (
-    _Needed("frequency_sweep", ("omega", *_MODULI), (), ("omega", *_MODULI), _NO_MODULUS),
-    *(
-        _Needed("amplitude_sweep", (*keys, *_MODULI), (), ("strain_amplitude",), "no strain")
-        for keys in (("strain_amplitude", "omega"), ("strain_amplitude",))
-    ),
-    _Needed(
-        "flow_curve", ("shear_rate", "stress"), _NORMAL, ("shear_rate", "stress"), "no steady flow"
-    ),
+    _Needed("frequency_sweep", _SWEEP, (), _SWEEP, _NO_MODULUS),
+    _Needed("amplitude_sweep", (*_SIZE, *_SWEEP), (), _SIZE, "no strain"),
+    _Needed("amplitude_sweep", (*_SIZE, "Gp", "Gpp"), (), _SIZE, "no strain"),
+    _Needed("flow_curve", _STEADY, _NORMAL, _STEADY, "no steady flow"),
     _Needed("run", ("time", "tensile_stress", "hencky_rate")),
     _Needed("run", ("time", "tensile_stress", "hencky_strain")),
     _Needed("run", ("time", "shear_rate", "stress"), (*_NORMAL, "strain")),
@@ -57,10 +55,8 @@ _NEEDED = (
     _Needed("creep", ("time", "stress", "strain")),
     _Needed("creep", ("time", "stress", "shear_rate")),
     # as the instrument's software computed it
-    *(
-        _Needed(kind, ("time", key), (), ("time", key), f"no {key.rpartition('_')[2]}")
-        for kind, key in (("relaxation", "relaxation_modulus"), ("creep", "compliance"))
-    ),
+    _Needed("relaxation", _MODULUS, (), _MODULUS, "no modulus"),
+    _Needed("creep", _COMPLIANCE, (), _COMPLIANCE, "no compliance"),
 )
 
 

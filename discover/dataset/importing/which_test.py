@@ -283,7 +283,9 @@ class _Course:
         self.follows_stress = straight(time, stress) and not self.rate_is_set
         self.ways = None if rate is None else up_and_down(rate, stress)
         # the strain later on: what is left of its rise lies before the middle of the record
-        self.late = None if strain is None else strain[len(strain) // 4 :]
+        late = np.zeros(1) if strain is None else strain[len(strain) // 4 :]
+        self.is_held = strain is not None and bool(np.median(strain)) and spread(late) < CONSTANT
+        self.goes_on = strain is None or np.ptp(late) > _MOVES * np.max(np.abs(strain))
         # a part of the strain that is there at once, as a given stress makes it
         self.jumps = False
         if strain is not None and len(time) >= 5:
@@ -307,10 +309,9 @@ class _Course:
         calls = f"it is called {said.words!r}"
         if said.test == "recovery" and not flows and not said.by_file_name:
             return "none", f"a recovery ({calls}), {_WITHOUT_CREEP}"
-        goes_on = self.late is None or np.ptp(self.late) > _MOVES * np.max(np.abs(self.strain))
         excluded = {
             "creep": flows and "the rate is held and the stress is not",
-            "relaxation": (flows or only_stress) and goes_on and "the strain is not held",
+            "relaxation": (flows or only_stress) and self.goes_on and "the strain is not held",
             "start_up": only_stress and self.drifts and "the stress is held and the rate is not",
         }.get(said.test)
         if excluded:
@@ -348,8 +349,7 @@ class _Course:
             return "flow_curve", "the rate goes up and down in steps, and the stress is the same"
         if self.follows_stress:
             return "creep", "a ramp of stress, which the strain follows"
-        is_held = self.late is not None and spread(self.late) < CONSTANT
-        if is_held and not self.rate_is_set and np.median(strain):
+        if self.is_held and not self.rate_is_set:
             return "relaxation", "the strain is held, and the stress relaxes"
         if ways is not None:
             return "run", (

@@ -150,7 +150,7 @@ def _product(text: str) -> Unit | None:
         unit = _registry().parse_units(text)
     except Exception:  # each wrong order of signs fails in its own way
         return None
-    size = (1.0 * unit).to_base_units()
+    size = _registry().Quantity(1.0, unit).to_base_units()
     found = dict(size.dimensionality)
     if not set(found) <= set(_DIMENSIONS):
         return None
