@@ -85,9 +85,8 @@ def _run(
 ) -> TaskResult:  # fmt: skip
     """Run a task on a study; InputError if the study, its data or the folder is wrong.
 
-    `out`: folder for the results; goes on there if it holds unfinished ones. `seed`, `tolerance`:
-    in place of the study's. `overwrite`: start afresh. `progress`: called with what is going on and
-    the fraction done.
+    `out`: goes on there with unfinished results. `seed`, `tolerance`: in place of the study's.
+    `progress`: called with what is going on and the fraction done.
     """
     enable_x64()
     enable_compilation_cache()
@@ -135,10 +134,9 @@ def run_batch(
 ) -> BatchResult:  # fmt: skip
     """Run studies into folders of their own; one that fails does not stop the others.
 
-    A study with a ``[loop]`` section closes the loop, one with ``[compare]`` or neither compares,
-    one with both does both. `workers`: processes on this machine; with 1, everything happens in
-    this one. `scheduler`: address of a dask scheduler to use instead. Raises InputError if two
-    studies would write to one folder, or `out` cannot be written to.
+    A study with ``[loop]`` closes the loop, one with ``[compare]`` or neither compares. With one of
+    `workers` everything happens in this process. Raises InputError if two studies would write to
+    one folder, or `out` cannot be written to.
     """
     make_folder(out)
     resumable.set()
@@ -170,8 +168,8 @@ def run_batch(
 def folder_names(paths: Sequence[Path]) -> list[str]:
     """Return a folder name for every study: its stem, with its folder's name where stems repeat.
 
-    Names that differ by capitals alone are one name. A study that has the name of one of the
-    batch's own files gets ``study-`` before it. Raises InputError if two still have one name.
+    Capitals make no difference; names of the batch's own files get ``study-`` before them. Raises
+    InputError if two still have one name.
     """
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     times = Counter(stem.casefold() for stem in stems)

@@ -99,8 +99,7 @@ _PAGE_PAUSE = 5.0  # seconds in which the page is written once, however many stu
 class Summary:
     """Follows the jobs of a batch, given as name and task, and says how far it is.
 
-    Writes ``index.html``, ``table.csv`` and ``batch.json``. Studies whose result was there already
-    do not count as time: finding it takes none.
+    Studies whose result was there already do not count as time.
     """
 
     def __init__(

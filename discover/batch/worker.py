@@ -1,7 +1,6 @@
 """A process that runs one study after the other for `discover.batch.workers`.
 
-Jobs come as lines of JSON on standard input, word of them goes out as lines of JSON on standard
-output. Nothing else connects the two processes: there is no port that others could reach.
+Jobs come, and word of them goes, as lines of JSON: there is no port that others could reach.
 """
 
 import json

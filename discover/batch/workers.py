@@ -33,9 +33,8 @@ def run_in_workers(
     say: Callable[[int, str, float], None],
     end: Callable[[int, StudyStatus], None],
 ) -> None:
-    """Run jobs side by side.
+    """Run jobs side by side; one whose worker dies goes to another, and on from its last part.
 
-    A study whose worker dies goes to another, where it continues from its last finished part.
     `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
     with the position, and how it ended.
     """
@@ -132,9 +131,8 @@ def run_on_cluster(
 ) -> None:  # fmt: skip
     """Run jobs side by side on a dask cluster, whose workers know files by the same paths.
 
-    For ``tls://`` the certificates are those that dask's own settings name,
-    ``distributed.comm.tls``. `say`, `end`: as in `run_in_workers`. Raises InputError if dask is not
-    installed, or no scheduler answers at the address.
+    `say`, `end`: as in `run_in_workers`. Raises InputError if dask is not installed, or no
+    scheduler answers at the address.
     """
     try:
         from distributed import Client, as_completed

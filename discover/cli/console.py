@@ -44,9 +44,7 @@ class _HeardOrNot(io.FileIO):
 def heard_or_not(stream: Any) -> Any:
     """Return a standard stream that takes any character, and lets its reader leave early.
 
-    What ``| head`` does not want to see is no reason to leave files unwritten, or for another exit
-    code. Characters that a terminal does not know, such as σ, or half of one in a file's name, are
-    spelled out.
+    Characters that a terminal does not know, such as σ, are spelled out.
     """
     if not isinstance(stream, io.TextIOWrapper):  # somebody's own, or none at all
         return stream
@@ -151,10 +149,9 @@ _PATIENCE = 4.0  # seconds for last words
 def obeying_interrupts() -> Iterator[None]:
     """End the process within about a second of Ctrl-C, with one line and `INTERRUPTED_CODE`.
 
-    Python alone raises an exception in the main thread between two of its instructions: never while
-    a program is compiled, and it is lost in a library's callback. So a thread of its own listens,
-    has the last words said and ends the process; files are whole or absent at any time. Does
-    nothing outside the main thread, and where somebody else handles the signal already.
+    Python alone raises an exception between two instructions of the main thread: never while a
+    program is compiled, and it is lost in a library's callback. So a thread listens and ends the
+    process. Does nothing outside the main thread, or where somebody handles the signal already.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

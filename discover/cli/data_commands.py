@@ -68,12 +68,13 @@ def show(
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.load import load_dataset
     from discover.dataset.run_table import run_line
+    from discover.words import counted
 
     dataset = load_dataset(name)
     tables = [run_line(run) for run in dataset.material_functions.values()]
     rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
-    n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
+    n_sweep = 0 if sweep is None else len(sweep)
     page, kept = None, []
     if out is not None:
         here = Path(name)
@@ -86,8 +87,7 @@ def show(
         typer.echo(json.dumps({**content, **written}, indent=2))
         return
     linear = f"a linear sweep with {n_sweep} points" if n_sweep else "no linear sweep"
-    runs = "1 run" if len(rows) == 1 else f"{len(rows)} runs"
-    say(f"{dataset.name}: {runs}, {linear}")
+    say(f"{dataset.name}: {counted(len(rows), 'run')}, {linear}")
     typer.echo(
         f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  flow"
     )

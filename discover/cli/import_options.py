@@ -33,10 +33,8 @@ def merge_mapping(
 ) -> Mapping:  # fmt: skip
     """Return the mapping of a file with the options of the command line on top.
 
-    `given`: ``columns``, ``units``, as ``stress=Shear stress``; ``tests``, ``creep``,
-    ``melt.txt=creep`` or ``melt.txt:2=creep``; ``temperatures``, ``40``, the one to import, or
-    ``melt.txt=40``, that of a file, in °C, or as ``313K``. `geometry`: as
-    ``cone_plate:radius_mm=25,angle_deg=1``. Raises InputError if the file or an option is wrong.
+    `given`: as ``stress=Shear stress``, ``creep``, ``melt.txt:2=creep``, ``40``, ``melt.txt=313K``.
+    `geometry`: as ``cone_plate:radius_mm=25,angle_deg=1``. Raises InputError if one is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):
@@ -107,8 +105,7 @@ def write_folder(
 ) -> None:
     """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
 
-    A mapping file that was read and stands in the folder is left as it is. Raises InputError if the
-    folder holds data already, or a table would take the place of a file that was read.
+    Raises InputError if it holds data already, or a table would replace a file that was read.
     """
     for name in (*imported.files, *([] if mapping_file else [MAPPING_FILE])):
         read = [source.file for source in imported.mapping.source if _same(out / name, source.file)]

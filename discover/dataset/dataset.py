@@ -203,9 +203,8 @@ class Dataset(NotebookView):
         return replace(self, runs=(*self.runs, *added), material_functions=left)
 
     def quantity_by_quantity(self) -> "Dataset":
-        """Return the data with N1 and N2, where recorded, as runs of their own next to σ12.
+        """Return the data with N1 and N2, where recorded, as runs of their own: ``"a.csv (N1)"``.
 
-        The run of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and tested like any other.
         Samples that no fluid can have are left out; a run of nothing else is set aside.
         """
         late, never = sound_normal_stress(self.runs, self.linear_sweep)
@@ -220,10 +219,9 @@ class Dataset(NotebookView):
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None
     ) -> "tuple[Dataset, Dataset]":
-        """Return the runs to fit and the held-out runs, as two data sets.
+        """Return the runs to fit, by default all others, and the held-out runs, as two data sets.
 
-        `held_out`: names of the runs that no fit may see. `fit`: of those to fit; by default all
-        others. Raises InputError if a run does not exist or is in both, or one would be empty.
+        Raises InputError if a run does not exist or is in both, or one would be empty.
         """
         for label, names in (("held_out", held_out), ("fit", fit)):
             if isinstance(names, str):

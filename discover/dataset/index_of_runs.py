@@ -82,9 +82,8 @@ def _cells(index: Table, key: str, column: str) -> Sequence[str]:
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
     """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
 
-    Without a name, a column that begins with ``rate_before`` holds the rates of those runs that are
-    declared to start from a steady flow. An empty cell is a start from rest, but of such a run a
-    fault. Raises InputError if the column is missing, or a cell holds something else.
+    Without a name, a column that begins with ``rate_before`` holds the rates of runs declared to
+    start from a steady flow. Raises InputError as `rates_in`.
     """
     steady = starts_steady(index)
     if column is not None:
@@ -110,10 +109,9 @@ def column_of_rates_before(index: Table) -> str | None:
 
 
 def rates_in(index: Table, column: str) -> Float[np.ndarray, " runs"]:
-    """Return the rates in 1/s in a column of rates before, 0 where a run starts from rest.
+    """Return the rates in 1/s in a column of rates before; an empty cell is 0, a start from rest.
 
-    Raises InputError if it is missing, in the unit of another quantity, or holds no number: empty
-    cells are starts from rest, unless the run is declared to start from a steady flow.
+    Raises InputError if it is missing, in the unit of another quantity, or holds no number.
     """
     return _numbers_before(index, column) * units.heading_factor(column, units.SHEAR_RATE)
 

@@ -196,10 +196,9 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
 def _covariance(
     sweep: LinearSweep, found: RelaxationSpectrum, rows: Float[np.ndarray, "2 n"]
 ) -> Float[np.ndarray, "c c"]:
-    """Return s² (AᵀA)⁻¹ of moduli and solvent, s² the misfit for each degree of freedom left.
+    """Return s² (AᵀA)⁻¹ of moduli and solvent at given times, s² the misfit per degree of freedom.
 
-    Where the misfit is no noise, so many neighbouring frequencies count as one as its
-    autocorrelation says. At given times: a change of a time moves G′ and G″ as these errors do.
+    Where the misfit is no noise, neighbouring frequencies count as its autocorrelation says.
     """
     has_solvent = found.solvent_viscosity > 0.0
     amounts = np.append(found.modulus, [found.solvent_viscosity] if has_solvent else [])

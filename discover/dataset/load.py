@@ -1,7 +1,8 @@
 """Load a folder of measured runs, ``runs.csv``, a CSV a run and tables; or tables in memory."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from inspect import signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,6 +25,7 @@ from discover.dataset.records.repeats import in_sequence
 from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import (
+    Table,
     did_you_mean_file,
     is_inside,
     read_bytes,
@@ -161,38 +163,73 @@ def _read_folder(
     if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
         raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
     index = read_index(root)
-    names = index.columns["file"]
-    problems = Problems()
-    tables, unused, sweep = {}, {}, None
-    with problems.collected():
-        tables, unused = read_material_functions(root, names, frequency)
-    with problems.collected():
-        sweep = find_sweep(root)
     factors = read_clock_factors(index, clock_factor)
-    before = rates_before(index, rate_before)
-    aside: dict[str, str] = {}
-    used: list[int] = []
-    runs: list[Run] = []
-    for row, file in enumerate(names):
-        steady = None if before is None else float(before[row])
+    read = read_folder(
+        root, index, rates_before(index, rate_before), factors, bool(rate_is_measured), frequency
+    )
+    problems = Problems()
+    for wrong in read.wrong.values():
         with problems.collected():
-            try:
-                table, factor = table_of_run(root, file), float(factors[row])
-                runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
-                used.append(row)
-            except SetAside as why:
-                aside[file] = str(why)
-    if aside and not used and not problems:
-        raise InputError(
-            f"No run of {name!r} can be fitted: {names[0]} is set aside, since {aside[names[0]]}."
-        )
+            raise wrong
+    if read.aside and not read.runs and not problems:
+        first, why = next(iter(read.aside.items()))
+        raise InputError(f"No run of {name!r} can be fitted: {first} is set aside, since {why}.")
     problems.require_none(name)
+    runs = list(read.runs.values())
     if sequence is not None and runs:
-        runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]
+        used = [index.columns["file"].index(run.name) for run in runs]
+        runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
     provenance, path = "", root / PROVENANCE_FILE
     if os.path.isfile(path) and is_inside(root, PROVENANCE_FILE):
         provenance = read_bytes(path, path.name).decode("utf-8", "replace")
-    return Dataset(name, tuple(runs), sweep, provenance, {**unused, **aside}, tables)
+    aside = {**read.unused, **read.aside}
+    return Dataset(name, tuple(runs), read.sweep, provenance, aside, read.tables)
+
+
+@dataclass
+class Folder:
+    """What was read of a data folder, by file, and what is wrong with it."""
+
+    samples: dict[str, Table] = field(default_factory=dict)  # of the runs, as text
+    runs: dict[str, Run] = field(default_factory=dict)
+    aside: dict[str, str] = field(default_factory=dict)  # why runs cannot be fitted
+    sweep: LinearSweep | None = None
+    tables: dict[str, Run] = field(default_factory=dict)  # material functions, by kind
+    unused: dict[str, str] = field(default_factory=dict)  # why tables cannot be used
+    wrong: dict[tuple[str, str], InputError] = field(default_factory=dict)  # by subject and file
+
+
+def read_folder(
+    root: Path, index: Table, before: Sequence[float] | np.ndarray | None,
+    factors: Sequence[float] | np.ndarray | None = None, rate_is_measured: bool = False,
+    frequency: float | None = None,
+) -> Folder:  # fmt: skip
+    """Return all that can be read of a folder, after its index.
+
+    `before`, `factors`: rate before in 1/s and clock factor of each run. `frequency`: of an
+    amplitude sweep without its own, in rad/s.
+    """
+    read, names = Folder(), index.columns["file"]
+    for row, file in enumerate(names):
+        factor = 1.0 if factors is None else float(factors[row])
+        steady = None if before is None else float(before[row])
+        try:
+            table = table_of_run(root, file)
+            read.runs[file] = read_run(table, index, row, factor, rate_is_measured, steady)
+            read.samples[file] = table
+        except SetAside as why:
+            read.aside[file] = str(why)
+        except InputError as wrong:
+            read.wrong["run", file] = wrong
+    try:
+        read.sweep = find_sweep(root)
+    except InputError as wrong:
+        read.wrong["sweep", SWEEP_FILE] = wrong
+    try:
+        read.tables, read.unused = read_material_functions(root, names, frequency)
+    except InputError as wrong:
+        read.wrong["tables", ""] = wrong
+    return read
 
 
 def find_sweep(root: Path) -> LinearSweep | None:
@@ -245,18 +282,8 @@ def from_dataframe(
         raise InputError(f"tables must be a mapping of names to tables; got {short(tables)}.")
     if not isinstance(name, str):
         raise InputError(f"The name of a data set must be text; got {short(name)}.")
-    for label, table in [("samples", samples), ("runs", runs), *(tables or {}).items()]:
-        if not (table is None or isinstance(table, pd.DataFrame)):
-            raise InputError(f"{label} must be a pandas DataFrame; got a {type(table).__name__}.")
-    samples, runs = (one if one is None else _flat(one) for one in (samples, runs))
-    tables = {kind: _flat(table) for kind, table in (tables or {}).items()}
-    for label, table in [("samples", samples), ("runs", runs), *tables.items()]:
-        odd = [] if table is None else [one for one in table.columns if not isinstance(one, str)]
-        if odd:
-            raise InputError(
-                f"The columns of {label} must have text for names, on one level; got "
-                f"{short(odd[0])}. Rename them, or flatten them with reset_index()."
-            )
+    samples, runs = (_plain(label, one) for label, one in (("samples", samples), ("runs", runs)))
+    tables = {kind: _plain(kind, table) for kind, table in (tables or {}).items()}
     known = [*signature(_read_folder).parameters][2:]
     if no_option := [one for one in options if one not in known]:
         raise InputError(unknown_name("option", no_option[0], known, "from_dataframe"))
@@ -276,8 +303,17 @@ def from_dataframe(
         return _read_folder(Path(folder), name, **options)
 
 
-def _flat(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with the named levels of its index as columns."""
+def _plain(label: str, table: pd.DataFrame | None) -> Any:
+    """Return a table with the named levels of its index as columns; InputError if it is none."""
+    if not (table is None or isinstance(table, pd.DataFrame)):
+        raise InputError(f"{label} must be a pandas DataFrame; got a {type(table).__name__}.")
+    if table is None:
+        return None
+    if odd := [one for one in table.columns if not isinstance(one, str)]:
+        raise InputError(
+            f"The columns of {label} must have text for names, on one level; got {short(odd[0])}. "
+            "Rename them, or flatten them with reset_index()."
+        )
     named = [n for n in table.index.names if isinstance(n, str) and n not in table.columns]
     return (table.reset_index(level=named) if named else table).reset_index(drop=True)
 

@@ -127,9 +127,5 @@ modes and is fitted or judged only where that is asked for."""
 
 
 def as_compared(runs: Iterable[Run]) -> list[Run]:
-    """Return runs as learners take them: oscillations as a record of each modulus.
-
-    Where the stress is imposed, the strain is what is observed: a rate derived from a noisy strain
-    errs smoothly, which looks like a missing term.
-    """
+    """Return runs as learners take them: oscillations as a record of each modulus."""
     return [record for run in runs for record in run.records]

@@ -1,7 +1,7 @@
 """Relaxation modes, solvent viscosity and elastic constant that a linear sweep supports."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import Any, Literal
@@ -60,7 +60,7 @@ class ModeSearch:
 
     Non-negative least squares on a fine grid of times finds the most modes that the sweep supports
     [Lawson & Hanson 1974]. Their times are then fitted jointly, and modes merged or left out one by
-    one, the least missed first, down to one. Solvent and elastic constant are with and without.
+    one, the least missed first; solvent and elastic constant with and without.
     """
 
     frequency: Float[np.ndarray, " n"]  # in rad/s
@@ -68,12 +68,12 @@ class ModeSearch:
     # known beforehand, always fitted, or, with None, only where evidence asks for it
     solvent_viscosity: float | Literal["fit"] | None = None
     elastic_modulus: float | Literal["fit"] | None = None
-    bounds: tuple[float, float] = field(init=False)
 
-    def __post_init__(self):
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Shortest and longest time in s that a mode may have."""
         margin = 10.0**BEYOND
-        ends = 1.0 / margin / self.frequency.max(), margin / self.frequency.min()
-        object.__setattr__(self, "bounds", ends)
+        return 1.0 / margin / self.frequency.max(), margin / self.frequency.min()
 
     @cached_property
     def _target(self) -> Float[np.ndarray, " rows"]:

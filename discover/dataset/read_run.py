@@ -60,8 +60,7 @@ class DeclaredTest(NamedTuple):
 def declared_test(index: Table, row: int, rate_before: float | None) -> DeclaredTest:
     """Return which test the run on a line of ``runs.csv``, from 0, is; InputError if it is none.
 
-    `rate_before`: of the steady flow before it, in 1/s, where the study says so. Raises SetAside
-    if there was such a flow and nobody says its rate.
+    Raises SetAside if a steady flow came before it and nobody says its rate.
     """
     flow, control, start = (_word(index, row, column) for column in _VALUES)
     step, time = (_number(index, row, column) for column in ("step_strain", "step_time_s"))

@@ -19,11 +19,7 @@ _VARYING = "varying rate"
 
 
 def run_line(run: Run) -> dict[str, Any]:
-    """Return what a reader asks first of a run.
-
-    Frequency (rad/s) and strain amplitude are there for oscillations alone. They are read off the
-    shear rate at the samples, so that commanded and measured rates are treated alike.
-    """
+    """Return what a reader asks first of a run; frequency (rad/s) and amplitude where it swings."""
     flow = _flow(run)
     wave = oscillation(run) if flow in (_VARYING, "given stress") else None
     if wave and flow == _VARYING:

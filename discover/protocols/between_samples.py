@@ -2,8 +2,7 @@
 
 Each sample is predicted from its neighbours by a straight line and by a cubic, and the curve is
 smooth where the cubic predicts far better   [leaving out one at a time: Stone 1974, J. R. Stat.
-Soc. B 36, 111]. Across a jump neither predicts anything, so there no spline swings; in noise both
-predict as badly.
+Soc. B 36, 111]. Across a jump, and in noise, neither does.
 """
 
 from collections.abc import Sequence
@@ -60,8 +59,7 @@ def knots_between(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return knots whose straight lines lie on the curve, and have its area in each interval.
 
-    `times`, `rates`: of the samples; at a given stress the stress. `another`: whether to take
-    another curve through them, as `another_between_samples`.
+    `another`: whether to take another curve through the samples, as `another_between_samples`.
     """
     stretches = _smooth_stretches(times, rates)
     knots, values = [times], [rates]
@@ -90,8 +88,7 @@ def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProto
     """Return a protocol whose rate is another curve through the same samples, at `times` in s.
 
     It is of fifth degree for a cubic spline, monotonic for straight lines   [Fritsch & Carlson
-    1980, SIAM J. Numer. Anal. 17, 238]: the difference is what nobody knows of the rate. None where
-    the rate was commanded: constant, a wave, or steps.
+    1980, SIAM J. Numer. Anal. 17, 238]. None where the rate was commanded.
     """
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     # a jump at 0 ends what came before the record, which no sample holds
@@ -215,9 +212,8 @@ def steps_between_samples(
 ) -> tuple[RateStep, ...]:
     """Return the steps of a rate whose instants its samples, in s and 1/s, do not tell.
 
-    The rate changes from one sample to the next, and hardly before and after. A straight line
-    between the two stands for a step halfway, which errs by up to half the strain of the interval.
-    A rate that was given as a function of time has no such step.
+    The rate changes from one sample to the next, and hardly before and after: a straight line
+    between the two errs by up to half the strain of the interval.
     """
     if protocol.control != "rate" or np.any(np.asarray(protocol.amplitudes)) or len(time) < 4:
         return ()

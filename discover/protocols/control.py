@@ -20,10 +20,7 @@ _AT_ONCE, _JUMP, _LEVEL = 1e-3, 0.05, 0.15
 
 
 def steady_rates(rates: Sequence[float] | np.ndarray) -> FlowProtocol:
-    """Return rates each held until the flow is steady: a flow curve, one sample for each rate.
-
-    `rates` in 1/s.
-    """
+    """Return rates in 1/s, each held until the flow is steady: a flow curve."""
     counted = np.arange(1.0, len(rates) + 1.0)
     return replace(measured_rate(counted, rates), control="steady")
 
@@ -31,7 +28,7 @@ def steady_rates(rates: Sequence[float] | np.ndarray) -> FlowProtocol:
 def oscillations(
     strains: Sequence[float] | np.ndarray, frequencies: Sequence[float] | np.ndarray
 ) -> FlowProtocol:
-    """Return oscillations each gone on until it is periodic: one sample for each of them.
+    """Return oscillations, each gone on until periodic.
 
     `strains`, `frequencies`: amplitude and rad/s of each, shape (n,).
     """
@@ -47,9 +44,8 @@ def oscillations(
 def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> FlowProtocol:
     """Return the stress at samples as what is imposed, from rest at t = 0.
 
-    Between samples it is smooth where they are, else straight (`sampled_rate`). It jumps at t = 0
-    if the first samples hold one level, and between two levels (creep and recovery, a staircase)
-    right after the last sample of the first, in a thousandth of the time to the next sample.
+    Between samples it is as a `sampled_rate` is. It jumps at t = 0 if the first samples hold one
+    level, and between two levels right after the last sample of the first.
 
     `times` in s, increasing from 0 on; `stress` in Pa. Raises InputError if there are fewer than
     two samples, or no stress.

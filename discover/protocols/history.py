@@ -115,9 +115,7 @@ def after_alternation(
 def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
     """Return the protocol with as many cycles before the record as a mode needs to be periodic.
 
-    For integrators that wait. What is no oscillation that had gone on is returned as it is.
-    `relaxation_time`: the longest, in s. Raises InputError if more than `MOST_CYCLES` would be
-    needed.
+    `relaxation_time`: the longest, in s. InputError if more than `MOST_CYCLES` would be needed.
     """
     start, end = np.asarray(protocol.cycle)
     period, begins = end - start, float(protocol.begins)

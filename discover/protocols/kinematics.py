@@ -153,11 +153,7 @@ def normal_stress_differences(
     recorded: Float[np.ndarray, "trials runs n"],
     of_modes: Float[np.ndarray, "trials runs n 4"],
 ) -> Float[np.ndarray, "trials runs n 2"]:
-    """Return N1 and N2 of runs, of the recorded stress and σ11, σ22, σ33, σ12 of the modes.
-
-    What else stands in the recorded stress is that of a generalised Newtonian fluid, which in shear
-    has neither.
-    """
+    """Return N1 and N2 of runs, of the recorded stress and σ11, σ22, σ33, σ12 of the modes."""
     weights = np.array([_RECORDED["N1"], _RECORDED["N2"]])
     found = of_modes @ weights.T
     if kinematics is None:

@@ -232,8 +232,7 @@ def recording(protocol: FlowProtocol, quantity: RecordedQuantity) -> FlowProtoco
 def stack_protocols(protocols: Sequence[FlowProtocol]) -> FlowProtocol:
     """Return one protocol with a leading batch axis, for `jax.vmap`.
 
-    Tables are padded by holding their last value, cosines by zero amplitudes. Simple shear keeps
-    its fast path unless there is another flow among them.
+    Tables are padded by holding their last value, cosines by zero amplitudes.
     """
     m = max(p.table_times.shape[0] for p in protocols)
     c = max(p.amplitudes.shape[0] for p in protocols)

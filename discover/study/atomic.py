@@ -17,11 +17,10 @@ PART_SUFFIX = ".discover-part"
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    r"""Write a text file so that no reader ever sees half of it; a former one keeps its rights.
+    """Write a text file so that no reader ever sees half of it; a former one keeps its rights.
 
-    `text`: written as UTF-8; what UTF-8 cannot hold as ``\udcff``. Raises InputError if something
-    that is no plain file has the name, or a file that this command has read. Raises OSError if the
-    disk is full, say; what the file held before is still there.
+    Raises InputError if the name is not that of a plain file, or of one that this command has read;
+    OSError if the disk is full, say: what the file held before is still there.
     """
     path = Path(path)
     before = replaceable(path)
@@ -113,8 +112,7 @@ _held: "weakref.WeakValueDictionary[str, FolderLock]" = weakref.WeakValueDiction
 class FolderLock:
     """A lock on a folder, held until `release`, until it is forgotten, or until the process ends.
 
-    The operating system drops it however the process ends; it does not age. Where a system or its
-    disk knows no locks, there is none.
+    Where a system or its disk knows no locks, there is none.
     """
 
     def __init__(self, path: Path, descriptor: int):

@@ -48,8 +48,7 @@ def temperature(study: Study, dataset: Dataset) -> float | None:
 def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     """Return the data of a study, split into runs to fit and runs held out.
 
-    Raises InputError if a file is wrong, a named run does not exist, a run held out is a copy of
-    one to fit, or those to fit hold no signal.
+    Raises InputError if a file is wrong, a run does not exist or is a copy, or nothing is to fit.
     """
     data = study.data
     if data.synthetic is not None:
@@ -166,11 +165,7 @@ def _base(study: Study) -> Path | None:
 
 
 def fingerprint(study: Study, *extra: object) -> str:
-    """Return a hash of everything that decides a study's results.
-
-    The study, the files it names, the version of this software, and what the caller adds (task,
-    seed). Raises InputError if the data folder or a file in it cannot be read.
-    """
+    """Return a hash of everything that decides a study's results, `extra` too."""
     digest = hashlib.sha256(study.model_dump_json().encode())
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())

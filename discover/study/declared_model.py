@@ -1,7 +1,7 @@
 """From a study to its declared fluid."""
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -94,7 +94,11 @@ def declared_model(study: Study, dataset: Dataset) -> StudyModel:
     effects = known_effects(model.effects, "[model] effects")
     if model.from_ is not None:
         earlier = read_earlier(model.from_, study.path)
-        return _from_earlier(earlier, effects, _spectrum_of(earlier, dataset, model.sweep_rad_s))
+        sweep, found = dataset.linear_sweep, earlier.equation
+        usable = None if sweep is None else _usable(sweep, model.sweep_rad_s)
+        times = np.array(found.relaxation_time)
+        spectrum = spectrum_of_modes(usable, found.solvent_viscosity, times)
+        return _from_earlier(earlier, effects, spectrum)
     name = model.law if isinstance(model.law, str) and model.law in LAWS else "ucm"
     free = [key for key, value in model.parameters.items() if value == "fit"]
     parameters = {
@@ -235,32 +239,28 @@ def _law_of_each_mode(
 _SAME_MODES = 1e-6
 
 
-def _spectrum_of(
-    found: EarlierResult, dataset: Dataset, window: tuple[float, float] | None
+def spectrum_of_modes(
+    sweep: LinearSweep | None, solvent: float, times: np.ndarray, modulus: np.ndarray | None = None
 ) -> RelaxationSpectrum | None:
-    """Return the spectrum that the modes of a result come from; None if they are not the sweep's.
+    """Return the spectrum of a sweep that has these modes, whose errors it knows; None if none has.
 
-    A result holds modes without their errors, which intervals and verdicts have to allow for. One
-    factor on all times, or on all moduli, may have been fitted.
+    `solvent` in Pa s, `times` in s and `modulus` in Pa, shape (k,). One factor on all times may
+    have been fitted, and without moduli one on these.
     """
-    times = np.array(found.equation.relaxation_time)
-    if dataset.linear_sweep is None:
+    asked: tuple[dict[str, Any], ...]
+    asked = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
+    if sweep is None:
         return None
-    sweep = _usable(dataset.linear_sweep, window)
-    for spectrum in spectra_of(sweep, found.equation.solvent_viscosity, len(times)):
-        if spectrum.relaxation_time.shape == times.shape:
-            factor = times / spectrum.relaxation_time
-            if np.ptp(factor) <= _SAME_MODES * np.max(factor):
-                return spectrum
-    return None
-
-
-def spectra_of(sweep: LinearSweep, solvent: float, modes: int) -> Iterator[RelaxationSpectrum]:
-    """Yield those of a sweep alone, beside a solvent in Pa s, and of a number of modes."""
-    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": modes})
     for options in asked:
         with suppress(InputError):  # too short a sweep, of which the modes are not then
-            yield relaxation_spectrum(sweep, **options)
+            found = relaxation_spectrum(sweep, **options)
+            if found.relaxation_time.shape != times.shape:
+                continue
+            factor = times / found.relaxation_time
+            same = modulus is None or np.array_equal(found.modulus, modulus)
+            if same and np.ptp(factor) <= _SAME_MODES * np.max(factor):
+                return found
+    return None
 
 
 def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:
@@ -281,8 +281,8 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
 def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
     """Return a modulus in Pa and a relaxation time in s of the right order from the runs.
 
-    The time is a tenth of the median duration, or the inverse of a flow curve's middle rate or a
-    sweep's middle frequency; the modulus is the largest stress over rate times that.
+    The time is a tenth of the median duration, or the inverse of a middle rate or frequency; the
+    modulus is the largest stress over rate times that.
     """
 
     def slowest(run: Run) -> float:

@@ -48,10 +48,9 @@ class EarlierResult:
 
 
 def result_file(written: str, study_file: Path | None) -> Path:
-    """Return the file of an earlier result, ``loop.json`` or ``comparison.json``.
+    """Return the file of an earlier result; InputError if there is none, or it is not finished.
 
-    `written`: the folder, relative to the study file or to the working directory. Raises InputError
-    if there is none, or it holds no finished result.
+    `written`: the folder, relative to the study file or to the working directory.
     """
     folders = [Path(written)]
     if study_file is not None:
@@ -94,11 +93,7 @@ def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
 
 
 def _found(content: Mapping[str, Any], file: Path) -> EarlierResult:
-    """Return the declared law and effects of a loop or a comparison, and what either added.
-
-    Both write the likeliest hypothesis of a posterior: what was declared, as fitted with it, and
-    the effects that it adds, of fluid and instrument.
-    """
+    """Return the declared law and effects of a loop or a comparison, and what either added."""
     task, found, of_added, of_constants = "loop", content, "stages", "declared_parameters"
     if file.name == COMPARISON:
         task, of_added, of_constants = "comparison", "effects", "constants"

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discover.dataset import Dataset, RelaxationSpectrum, Run
+from discover.dataset import Dataset, Run
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
@@ -16,7 +16,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study
-from discover.study.declared_model import MODE_CONSTANTS, StudyModel, spectra_of
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, spectrum_of_modes
 from discover.study.schema import Study
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
@@ -72,8 +72,7 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
 def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     """Return a `Fluid` as the declared model of a study.
 
-    None is that of the data's linear sweep, whose error is then known, and without a sweep Maxwell
-    with G = 1 Pa and λ = 1 s.
+    None is that of the data's linear sweep, or without one Maxwell with G = 1 Pa and λ = 1 s.
     """
     if base is None and data.linear_sweep is not None:
         base = Fluid.from_sweep(data.linear_sweep)
@@ -91,9 +90,10 @@ def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     if differs_by_mode(base.law):
         own = "a law with constants of its own in each mode"
     name, parameters = name_of(base.law) or (own, {})
-    modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
+    modulus, times = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)
-    return StudyModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
+    spectrum = spectrum_of_modes(data.linear_sweep, solvent, times, modulus)
+    return StudyModel(base.law, name, parameters, modulus, times, (), spectrum, solvent)
 
 
 def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
@@ -115,8 +115,8 @@ def with_known(
 ) -> StudyModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
-    `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
-    InputError if an effect, a value or a constant is not as it should be.
+    `effects`: as ``[model] effects``. `by_mode`: which may differ from mode to mode. InputError
+    if an effect, a value or a constant is not as it should be.
     """
     for option, names in (("free", free), ("by_mode", by_mode)):
         if isinstance(names, str):
@@ -130,14 +130,3 @@ def with_known(
         )
     known = known_effects({} if effects is None else effects, "known_effects")
     return replace(declared, effects=known, free=tuple(dict.fromkeys(free)), by_mode=tuple(by_mode))
-
-
-def _spectrum(data: Dataset, base: Fluid) -> RelaxationSpectrum | None:
-    """Return the spectrum of the data's linear sweep if the modes are those."""
-    if data.linear_sweep is None:
-        return None
-    modulus, time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
-    for found in spectra_of(data.linear_sweep, float(base.solvent_viscosity), base.n_modes):
-        if np.array_equal(found.modulus, modulus) and np.array_equal(found.relaxation_time, time):
-            return found
-    return None

@@ -17,7 +17,7 @@ from discover.dataset.checking.runs import Finding, Findings, Severity, found
 from discover.dataset.index_of_runs import read_index
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import SWEEP_FILE
-from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
+from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units
@@ -60,37 +60,25 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
         findings += _before(index)
     except InputError as wrong:
         return Findings([*findings, *_errors(*place, wrong)])
-    names, read = index.columns["file"], []
-    runs: list[Run] = []
-    for row, name in enumerate(names):
-        try:
-            table = table_of_run(root, name)
-            rate = None if before is None else float(before[row])
-            runs.append(read_run(table, index, row, rate_before=rate))
-        except SetAside as why:
-            findings.append(found("set_aside", name, why=why))
-            continue
-        except InputError as wrong:
-            findings += _errors("run", name, wrong)
-            continue
-        read.append(table)
-        findings += run_checks.doubts_of_run(runs[-1])
-    sweep, spectrum, of_sweep = None, None, []
-    try:
-        sweep = load.find_sweep(root)
-    except InputError as wrong:
-        of_sweep = _errors("sweep", SWEEP_FILE, wrong)
-    else:
-        if sweep is None:
-            of_sweep = [found("no_sweep", SWEEP_FILE)]
-        else:
-            spectrum, of_sweep = _spectrum(sweep)
+    read = load.read_folder(root, index, before)
+    names, runs, sweep = index.columns["file"], [*read.runs.values()], read.sweep
+    for (subject, file), wrong in read.wrong.items():
+        findings += _errors(subject, file, wrong)
+    findings += [found("set_aside", name, why=why) for name, why in read.aside.items()]
+    for run in runs:
+        findings += run_checks.doubts_of_run(run)
     beside = []
     for name in (SWEEP_FILE, *_TABLE_FILES):
         if name not in names and (root / name).is_file():
             with suppress(InputError):  # said when it is read
                 beside.append(read_table(root / name))
-    findings += [*_of_columns(read, beside), *of_sweep]
+    findings += _of_columns([*read.samples.values()], beside)
+    spectrum = None
+    if sweep is not None:
+        spectrum, of_sweep = _spectrum(sweep)
+        findings += of_sweep
+    elif ("sweep", SWEEP_FILE) not in read.wrong:
+        findings.append(found("no_sweep", SWEEP_FILE))
     transients = [run for run in runs if run.protocol.control == "rate"]
     for run in transients:
         findings += start_up.doubts_of_start(run, sweep, spectrum)
@@ -99,8 +87,8 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
     findings += run_checks.doubts_among_runs(transients)
     if clock_factor is None and not _shift_columns(index):
         findings += run_checks.doubts_of_temperature(runs)
-    tables, of_tables = _tables(root, names, sweep)
-    findings += [*of_tables, *_others(root, names), *_copies([*runs, *tables.values()])]
+    findings += _of_tables(read)
+    findings += [*_others(root, names), *_copies([*runs, *read.tables.values()])]
     rank = get_args(Severity)
     return Findings(sorted(findings, key=lambda finding: rank.index(finding.severity)))
 
@@ -117,26 +105,19 @@ def _spectrum(sweep: load.LinearSweep) -> tuple[RelaxationSpectrum | None, list[
     return spectrum, list(linear_theory.doubts_of_sweep(sweep, spectrum))
 
 
-def _tables(
-    root: Path, names: Sequence[str], sweep: load.LinearSweep | None
-) -> tuple[dict[str, Run], list[Finding]]:
-    """Return the tables of steady and periodic states, and what each was taken for."""
-    try:
-        tables, aside = material_functions.read_material_functions(root, names)
-    except InputError as wrong:
-        return {}, _errors("tables", "", wrong)
-    findings: list[Finding] = []
-    for table in tables.values():
+def _of_tables(read: load.Folder) -> Iterator[Finding]:
+    """Yield what each table of steady and periodic states was taken for."""
+    for table in read.tables.values():
         kind = str(run_line(table)["flow"])
         kind = f"{'an' if kind[0] in 'ao' else 'a'} {kind}"
-        findings.append(
-            found("table", table.name, kind=kind, samples=counted(len(table), "sample"))
-        )
-    findings += [found("table_set_aside", name, why=reason) for name, reason in aside.items()]
-    if "amplitude_sweep" in tables:
-        findings += [] if sweep is None else [found("sweep", SWEEP_FILE, samples=len(sweep))]
-        findings += linear_theory.doubts_of_amplitude_sweep(tables["amplitude_sweep"], sweep)
-    return tables, findings
+        yield found("table", table.name, kind=kind, samples=counted(len(table), "sample"))
+    for name, reason in read.unused.items():
+        yield found("table_set_aside", name, why=reason)
+    if "amplitude_sweep" in read.tables:
+        if read.sweep is not None:
+            yield found("sweep", SWEEP_FILE, samples=len(read.sweep))
+        sweep = read.tables["amplitude_sweep"]
+        yield from linear_theory.doubts_of_amplitude_sweep(sweep, read.sweep)
 
 
 def _shift_columns(index: Table) -> list[str]:

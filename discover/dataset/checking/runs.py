@@ -204,12 +204,11 @@ def steady_stress(run: Run) -> float | None:
 
 
 def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
-    """Yield which start-ups, of runs that load, do not go together with the others.
+    """Yield which start-ups do not go together with the others.
 
     In a faster start-up the largest stress is no smaller, and larger by the ratio of the rates at
-    most; half of it is reached no later, and earlier by that ratio at most. Shear thickening and
-    yielding break these rules by less than another unit of stress or of time does. Another unit of
-    rate may pass for thinning.
+    most; half of it is reached no later, and earlier by that ratio at most. Thickening and yielding
+    break these rules by less than another unit does.
     """
     for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
         alike = [r for r in runs if r.flow == kind and r.from_rest and is_start_up(r)]
@@ -243,11 +242,7 @@ def _half_time(run: Run) -> float:
 
 
 def _least_outside(values: Values, rates: Values, rises: bool) -> Values:
-    """Return by which factor each run is outside what the others allow; 1 inside.
-
-    Of two nobody knows which is wrong, and both are named; of more, a run is held against the one
-    that it fits best.
-    """
+    """Return by which factor a run is outside what the one that it fits best allows; 1 inside."""
     factors = np.ones(len(values))
     if not np.all(values > 0.0):
         return factors

@@ -117,9 +117,8 @@ def _early(run: Run, normal: Values) -> _Fault | None:
     """Hold N1 against what elasticity allows in start-up from rest.
 
     With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
-    only lowers it. At small strain any fluid with memory has N1 = 2 γ̇² ∫ s G(s) ds and
-    σ12 = γ̇ ∫ G(s) ds (Bird, Armstrong & Hassager 1987, vol. 1, ch. 6), so that
-    N1 = 2 γ̇ (t σ12 − ∫ σ12 dt), whatever its G and its solvent.
+    only lowers it. At small strain N1 = 2 γ̇² ∫ s G(s) ds and σ12 = γ̇ ∫ G(s) ds (Bird, Armstrong &
+    Hassager 1987, vol. 1, ch. 6), so that N1 = 2 γ̇ (t σ12 − ∫ σ12 dt) whatever G and solvent.
     """
     rate = abs(float(run.rate[0]))
     strain, stress = rate * run.time, run.stress * np.sign(run.rate[0])
@@ -199,11 +198,9 @@ def doubts_of_start(
 ) -> Iterator[Finding]:
     """Yield why a run that is taken as starting from rest cannot have started so, or does not show.
 
-    From rest a fluid has no stress but what the flow until the first sample made. A first stress
-    that is large is doubted if (1) it is the largest, and falls whatever the rate does; or (2) the
-    run is an oscillation of a fluid that is partly elastic, and its first cycle is like the later
-    ones; or (3) a linear sweep does not allow so much; or (4) the strain that was recorded says
-    that the rate had been another before.
+    A first stress is doubted that is large and (1) falls whatever the rate does; or (2) belongs to
+    an elastic fluid's oscillation whose first cycle is like the later ones; or (3) is more than a
+    linear sweep allows; or (4) comes with a strain that the rate had not made by then.
     """
     size, first = float(np.max(np.abs(run.stress))), abs(float(run.stress[0]))
     of_rest = run.protocol.control == "rate" and run.from_rest and len(run) > 4

@@ -10,15 +10,20 @@ import pandas as pd
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.records import Record
 from discover.dataset.importing.text_export import Block
+from discover.dataset.importing.which_test import Recognised
 from discover.dataset.load import INDEX_FILE, TESTS_FILE
 from discover.dataset.tables.table import shown
 
-# the table of each kind of test, without its ending
-TABLES = {
-    "frequency_sweep": "lve", "amplitude_sweep": "amplitude_sweep", "flow_curve": "flow_curve",
-    "relaxation": "relaxation", "creep": "creep",
-}  # fmt: skip
-_TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for table in TABLES.values()))
+# what each kind of test is called, and its table beside the runs, without its ending
+_KINDS = {
+    "frequency_sweep": ("a frequency sweep at small strain", "lve"),
+    "amplitude_sweep": ("an amplitude sweep", "amplitude_sweep"),
+    "flow_curve": ("a flow curve, of steady states", "flow_curve"),
+    "relaxation": ("relaxation after a step of strain", "relaxation"),
+    "creep": ("a test at a given stress", "creep"),
+    "run": ("a transient, such as start-up", ""),
+}
+_TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for _, table in _KINDS.values()))
 _NO_TEMPERATURE = (
     "Nothing says its temperature; if it is another, give it, as in --temperature FILE=60 or "
     "FILE:2=60 for a block. To exchange the two, rename them."
@@ -47,7 +52,7 @@ def files_of(found: Sequence[Record]) -> tuple[dict[str, str], list[str]]:
     notes: list[str] = []
     by_temperature: list[dict[str, str]] = []
     of_runs = {one.temperature for one in runs}
-    for kind, table in TABLES.items():
+    for kind, (_, table) in _KINDS.items():
         records = [one for one in found if one.kind == kind and not one.is_run]
         groups: list[list[Record]] = []  # by temperature
         for one in _merged(records) if kind == "amplitude_sweep" else records:
@@ -139,6 +144,34 @@ def unread_columns(columns: Sequence[tuple[str, str]]) -> Iterator[str]:
             f"{', '.join(files[:3])}{more}: columns not read: {names}. To have one, say what "
             'it is, as in --column N1="its name".'
         )
+
+
+THROUGH = {
+    "viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor",
+    "stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2",
+}  # fmt: skip
+"""Quantities that are read only where they have to stand for another."""
+
+
+def summary(where: str, readings: Readings, one: Recognised, made: Record, said: list[str]) -> str:
+    """Say what a block was taken for, and its columns unless they were among what was `said`."""
+    used = (f"{key} = {words}" for key, words in readings.used.items() if is_part(key, made))
+    understood = ", ".join(used)
+    columns = "columns as before" if understood in said else understood
+    said.append(columns)
+    rows = len(next(iter(made.table.values())))
+    text = f"{where}: read as {_KINDS[made.kind][0]} ({one.why}); {columns}; {rows} rows"
+    text += f", {made.dropped} without all these numbers left out" if made.dropped else ""
+    return "; ".join([text, *made.notes]) + "."
+
+
+def is_part(key: str, made: Record) -> bool:
+    """Return whether a quantity that was read went into the table, by itself or through another."""
+    if key == "strain_amplitude":
+        return made.kind == "amplitude_sweep"
+    if key == "strain":
+        return "strain" in made.table or "step_strain" in made.conditions
+    return key in made.table or key in THROUGH | {INSTRUMENT.get(name) for name in made.table}
 
 
 def left_out(where: str, block: Block, reason: str) -> str:

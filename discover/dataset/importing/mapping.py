@@ -1,8 +1,9 @@
 """What an import needs to know: which column is what, in which unit, on which geometry."""
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -119,28 +120,19 @@ def read_mapping(path: Path) -> Mapping:
 
 def write_mapping(mapping: Mapping) -> str:
     """Return a mapping as TOML."""
+    content = mapping.model_dump(exclude_defaults=True, exclude_none=True)
+    sources = [("[source]", source) for source in content.pop("source", ())]
+    sections = [(name, content.pop(name)) for name in list(content)
+                if isinstance(content[name], dict)]  # fmt: skip
     lines = ["# How this folder was imported. Repeat it with"]
-    lines += [f"#   discover data import --mapping {MAPPING_FILE} --out FOLDER"]
-    lines += [f"start_time_s = {mapping.start_time_s!r}"] if mapping.start_time_s else []
-    if mapping.temperature_C is not None:
-        lines.append(f"temperature_C = {mapping.temperature_C!r}")
-    if mapping.blocks is not None:
-        lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "layout", "geometry", "tests", "temperatures"):
-        section = getattr(mapping, name)
-        content = section if isinstance(section, dict) else section and section.model_dump()
-        known = {key: value for key, value in (content or {}).items() if value is not None}
-        if known:
-            lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(known[key])}" for key in known)]
-    for source in mapping.source:
-        lines += ["", "[[source]]", f"file = {_toml(source.file)}"]
-        lines += [f"sha256 = {_toml(source.sha256)}"] if source.sha256 else []
+    lines += [f"#   discover data import --mapping {MAPPING_FILE} --out FOLDER", *_lines(content)]
+    for name, section in (*sections, *sources):
+        lines += ["", f"[{name}]", *_lines(section)]
     return "\n".join(lines) + "\n"
 
 
-def _key(name: str) -> str:
-    return name if name.isidentifier() and name.isascii() else _toml(name)
-
-
-def _toml(value: object) -> str:
-    return toml_string(value) if isinstance(value, str) else repr(value)
+def _lines(content: dict[str, Any]) -> Iterator[str]:
+    for name, value in content.items():
+        key = name if name.isidentifier() and name.isascii() else toml_string(name)
+        value = list(value) if isinstance(value, tuple) else value
+        yield f"{key} = {toml_string(value) if isinstance(value, str) else repr(value)}"

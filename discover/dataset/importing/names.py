@@ -1,7 +1,6 @@
-"""What exports call each quantity, in many languages.
+"""What exports call each quantity, in many languages, compared word by word.
 
-Names are compared word by word, whatever their capitals, accents, separators and Greek letters. A
-name may be followed by its symbol, and words may be cut short.
+Capitals, accents, separators and spelled Greek letters make no difference.
 """
 
 import re

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -60,8 +60,7 @@ _SHORT = 3  # letters of a name that says too little without its unit
 def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
     """Return the place of each quantity among the columns of a block that hold a number.
 
-    A clock is a time only if no number is. `given`: names of columns that the user gave; they win.
-    Raises InputError if one stands above two columns.
+    `given`: names that the user gave; they win. Raises InputError if one stands above two columns.
     """
     names = [name for name, _ in block.columns]
     found: dict[str, int] = {}
@@ -133,8 +132,8 @@ def fits(key: str, name: str, unit: str) -> bool:
     return _is_unit_of(key, unit)
 
 
-def to_celsius(value: float, unit: str) -> float | None:
-    """Return a temperature in °C, or None if the unit is none of temperature."""
+def to_celsius(value: Any, unit: str) -> Any:
+    """Return a temperature, or an array of them, in °C; None if the unit is none of temperature."""
     scale = tidy_unit(unit).replace("º", "°").replace("°", "").removeprefix("deg").strip()
     scale = scale.upper().translate({0x421: "C", 0x41A: "K"})  # as a Russian keyboard writes them
     if scale in ("", "-", "1") and "°" not in unit and "deg" not in unit:
@@ -189,11 +188,7 @@ class UnsaidUnit(NamedTuple):
 
 
 def unsaid_unit(key: str, column: str, raw: Values, get: Get) -> UnsaidUnit:
-    """Return the unit of a column without one.
-
-    `get`: gives other columns of the block in SI units, None where it has no such column. An
-    angular frequency is one in rad/s, a frequency may count.
-    """
+    """Return the unit of a column without one; `get` gives other columns in SI units, or None."""
     choices = _CHOICES.get(key)
     if choices is None or (key == "omega" and "frequency" not in tables_of(column)):
         return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")
@@ -250,30 +245,21 @@ def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
     return next(((unit, why) for unit in near), None)
 
 
-UnsaidUnits = list[tuple[str, str, UnsaidUnit]]
-"""Quantities and files that do not give their units."""
-
-
-def _unsaid(found: UnsaidUnits, how: str) -> tuple[list[tuple[str, UnsaidUnit]], str]:
-    """Return the quantities whose unit is told so, once for each column, and the first files."""
-    first: dict[tuple[str, str], tuple[str, UnsaidUnit]] = {}
-    for key, file, one in found:
-        first.setdefault((key, one.column), (file, one))
-    said = [(key, file, one) for (key, _), (file, one) in first.items() if one.how == how]
-    files = list(dict.fromkeys(file for _, file, _ in said))
-    return [(key, one) for key, _, one in said], listed(files) if files else ""
+UnsaidUnits = dict[tuple[str, str], tuple[str, UnsaidUnit]]
+"""The first file that does not give the unit, by quantity and column."""
 
 
 def require_units(found: UnsaidUnits) -> None:
     """Raise InputError if there are units that only the user knows; asks for all of them."""
-    pairs, files = _unsaid(found, "asked")
-    if asked := dict(pairs):
+    asked = {key: pair for (key, _), pair in found.items() if pair[1].how == "asked"}
+    if asked:
         options = "; ".join(
             f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
-            for key, one in asked.items()
+            for key, (_, one) in asked.items()
         )
+        files = listed(list(dict.fromkeys(file for file, _ in asked.values())))
         what = "a unit" if len(asked) == 1 else "the units"
-        names = listed([shown(one.column) for one in asked.values()])
+        names = listed([shown(one.column) for _, one in asked.values()])
         raise InputError(
             f"{files} does not give {what} of {names}, and the numbers do not tell. "
             f"Say which: {options}."
@@ -282,12 +268,13 @@ def require_units(found: UnsaidUnits) -> None:
 
 def units_taken_as_si(found: UnsaidUnits) -> list[str]:
     """Return the sentence on what is taken as SI, if anything is."""
-    pairs, files = _unsaid(found, "assumed")
-    assumed = [(key, one) for key, one in pairs if QUANTITIES[key].unit]
-    if not assumed:
+    assumed = [(*pair, key) for (key, _), pair in found.items() if pair[1].how == "assumed"]
+    if not any(QUANTITIES[key].unit for *_, key in assumed):
         return []
-    read = listed([f"{shown(one.column)} in {one.unit}" for _, one in assumed])
-    key, one = assumed[-1]
+    files = listed(list(dict.fromkeys(file for file, *_ in assumed)))
+    with_units = [(one, key) for _, one, key in assumed if QUANTITIES[key].unit]
+    read = listed([f"{shown(one.column)} in {one.unit}" for one, _ in with_units])
+    one, key = with_units[-1]
     other = {"s": "min", "1/s": "1/min", "rad/s": "Hz"}.get(one.unit, f"m{one.unit}")
     return [
         f"warning: {files} gives no units here, so SI is taken: {read}. If one "

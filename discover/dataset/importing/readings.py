@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePath
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -24,8 +25,21 @@ INSTRUMENT = {
 }  # fmt: skip
 # a column of strain may be called the one or the other by who gives its unit
 SAME = {"strain": "strain_amplitude", "strain_amplitude": "strain"}
+# coefficients, the rate that they belong to, and its power
+_TIMES_RATE = {
+    "stress": ("viscosity", "shear_rate", 1),
+    "tensile_stress": ("extensional_viscosity", "hencky_rate", 1),
+    "N1": ("psi1", "shear_rate", 2),
+    "N2": ("psi2", "shear_rate", 2),
+}
 
 Values = Float[np.ndarray, " n"]
+
+
+class _Column(NamedTuple):
+    values: Values  # in SI units (°C)
+    words: str  # name, unit and factor
+    unsaid: UnsaidUnit | None = None  # its unit, where the file does not give it
 
 
 @dataclass
@@ -40,8 +54,8 @@ class Readings:
     begins: float = 0.0  # reading of a clock of the whole measurement, in s, when the block began
     used: dict[str, str] = field(default_factory=dict)  # whence each quantity asked for, in words
     unsaid: dict[str, UnsaidUnit] = field(default_factory=dict)  # their units that nobody gives
-    notes: dict[str, str] = field(default_factory=dict)  # what it says that cannot be, in words
-    _known: dict[str, tuple[Values, str, UnsaidUnit | None]] = field(default_factory=dict)
+    note: str = ""  # a temperature that cannot be, in words
+    _known: dict[str, _Column] = field(default_factory=dict)
 
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
@@ -66,6 +80,12 @@ class Readings:
         constant = self._constant(key)
         return None if constant is None else np.full(len(self), constant)
 
+    def known(self, key: str) -> Values:
+        """Return a quantity that is there."""
+        values = self.get(key)
+        assert values is not None
+        return values
+
     def unless_wrong(self, key: str) -> Values | None:
         """Return a quantity; None too where its unit is wrong, which is said later."""
         try:
@@ -83,9 +103,10 @@ class Readings:
 
     def whole(self, *keys: str) -> np.ndarray:
         """Return the rows that have a number in each of these quantities."""
-        values = (self.get(key) for key in keys)
-        kept = [np.zeros(len(self), bool) if v is None else np.isfinite(v) for v in values]
-        return np.all([np.ones(len(self), bool), *kept], axis=0)
+        rows = np.ones(len(self), bool)
+        for values in map(self.get, keys):
+            rows &= False if values is None else np.isfinite(values)
+        return rows
 
     def named(self) -> set[str]:
         """Return the quantities of which the block has a column or its header a number."""
@@ -129,67 +150,66 @@ class Readings:
         return None
 
     def _no_temperature(self, said: str) -> None:
-        self.notes["temperature"] = (
+        self.note = (
             f"{said} is not a temperature ({ABSOLUTE_ZERO} to 2000 °C) and not used; give it, as "
             f"in --temperature {shown(self.name)}=25"
         )
 
     def _column(self, key: str) -> Values:
-        """Return a column in SI units, read once; it counts as used whenever it is asked for."""
-        if key not in self._known:
-            self._known[key] = self._read(key), self.used[key], self.unsaid.get(key)
-        values, self.used[key], unsaid = self._known[key]
-        if unsaid is not None:
-            self.unsaid[key] = unsaid
-        return values
+        """Return a column in SI units, which from then on counts as used."""
+        read = self._read(key)
+        self.used[key] = read.words
+        if read.unsaid is not None:
+            self.unsaid[key] = read.unsaid
+        return read.values
 
-    def _read(self, key: str) -> Values:
+    def _read(self, key: str) -> _Column:
+        if key not in self._known:
+            self._known[key] = self._in_si(key)
+        return self._known[key]
+
+    def _in_si(self, key: str) -> _Column:
         at = self.columns[key]
         column, unit = self.block.columns[at]
-        self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit else "")
+        words = shown(column) + (f" [{shown(unit)}]" if unit else "")
         if key == "time" and any(is_clock(row[at]) for row in self.block.cells):
-            self.used[key] = f"{shown(column)} [clock, in s]"
-            return seconds([row[at] for row in self.block.cells], self._unit_given(key) or unit)
+            time = seconds([row[at] for row in self.block.cells], self._unit_given(key) or unit)
+            return _Column(time, f"{shown(column)} [clock, in s]")
         raw = self.block.numbers[at]
         if not (unit := self._unit_given(key) or unit):
             split = quantities.split_name(key, column)
             unit = "" if split is None else split[1]
         if key == "temperature":
-            kelvin = to_celsius(0.0, unit or "°C")
-            if kelvin is None:
-                return np.full(len(raw), math.nan)
-            degrees = np.array([to_celsius(value, unit or "°C") for value in raw], dtype=float)
+            degrees = to_celsius(raw, unit or "°C")
+            degrees = np.full(len(raw), math.nan) if degrees is None else degrees
             wrong = ~(_is_temperature(degrees) | np.isnan(degrees))
             if np.any(wrong):
                 worst = self.block.cells[int(np.argmax(wrong))][at]
-                self._no_temperature(f"{self.used[key]} {shown(worst)}")
-            return np.where(wrong, math.nan, degrees)
+                self._no_temperature(f"{words} {shown(worst)}")
+            return _Column(np.where(wrong, math.nan, degrees), words)
+        unsaid = None
         if not unit:
             lines = (c for c in self.block.constants if not c.value)
-            said = (c.unit for c in lines if rank_of(key, c.name) is not None)
-            unit = next(said, "") or self._unsaid(key, column, raw)
+            unit = next((c.unit for c in lines if rank_of(key, c.name) is not None), "")
+        if not unit:
+            unit, unsaid = self._unsaid(key, column, raw)
         factor = quantities.factor_to_si(key, unit, column, self.name)
-        self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
-        if key in self.unsaid and self.unsaid[key].how == "told":
-            self.used[key] += f", since {self.unsaid[key].why},"
-        if factor != 1.0:
-            self.used[key] += f" × {factor:.6g}"
-        return raw * factor
+        words = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
+        if unsaid is not None and unsaid.how == "told":
+            words += f", since {unsaid.why},"
+        return _Column(raw * factor, words + (f" × {factor:.6g}" if factor != 1.0 else ""), unsaid)
 
-    def _unsaid(self, key: str, column: str, raw: Values) -> str:
-        """Return the unit in which a column without one is read, and keep it in `unsaid`."""
+    def _unsaid(self, key: str, column: str, raw: Values) -> tuple[str, UnsaidUnit | None]:
+        """Return the unit in which a column without one is read, and what is to be said of it."""
         own = {one.column for one in QUANTITIES.values() if one.unit}
         if column == QUANTITIES[key].column and own & {name for name, _ in self.block.columns}:
-            return "1"  # a table of this project's own
-        if key not in self.unsaid:
-            used, unsaid = dict(self.used), dict(self.unsaid)
-            others = self.columns.keys() - {key}
-            found = quantities.unsaid_unit(
-                key, column, raw, lambda k: self._column(k) if k in others else None
-            )
-            # what tells a unit is not thereby part of the test
-            self.used, self.unsaid = used, {**unsaid, key: found}
-        return self.unsaid[key].unit
+            return "1", None  # a table of this project's own
+        # what tells a unit is not thereby part of the test
+        others = self.columns.keys() - {key}
+        found = quantities.unsaid_unit(
+            key, column, raw, lambda k: self._read(k).values if k in others else None
+        )
+        return found.unit, found
 
     def _made(self, key: str) -> Values | None:
         """Return a quantity that follows from others of the same row."""
@@ -198,7 +218,7 @@ class Readings:
             factor = self.geometry.per_signal(key)
             return None if factor is None else self._column(source) * factor
         if key in ("Gp", "Gpp"):
-            return self._moduli()[key == "Gpp"]
+            return self._modulus(np.cos if key == "Gp" else np.sin)
         if key == "strain_amplitude":
             if "strain" in self.columns:
                 return self._column("strain")
@@ -206,20 +226,16 @@ class Readings:
             if size is None or storage is None or loss is None:
                 return None
             return size / np.hypot(storage, loss)
+        source, rate_key, power = _TIMES_RATE.get(key, ("", "", 0))
         # a viscosity alone beside a Hencky rate is one of extension
         alone = "hencky_rate" in self.columns and "shear_rate" not in self.columns
-        named = "extensional_viscosity" in self.columns
-        tension = "viscosity" if alone and not named else "extensional_viscosity"
-        source, rate_key, power = {
-            "stress": ("viscosity", "shear_rate", 1),
-            "tensile_stress": (tension, "hencky_rate", 1),
-            "N1": ("psi1", "shear_rate", 2),
-            "N2": ("psi2", "shear_rate", 2),
-        }.get(key, ("", "", 0))
+        if key == "tensile_stress" and alone and source not in self.columns:
+            source = "viscosity"
         rate = self.get(rate_key) if source in self.columns else None
         return None if rate is None else self._column(source) * rate**power
 
-    def _moduli(self) -> tuple[Values | None, Values | None]:
+    def _modulus(self, part: np.ufunc) -> Values | None:
+        """Return the part of |G*|, or of |η*| ω, that the angle of loss or its tangent gives."""
         angle = self.alone("phase_angle")
         if angle is None and (factor := self.alone("loss_factor")) is not None:
             angle = np.arctan(factor)
@@ -227,9 +243,7 @@ class Readings:
         if angle is not None and size is None and "complex_viscosity" in self.columns:
             omega = self.get("omega")
             size = None if omega is None else self._column("complex_viscosity") * omega
-        if angle is None or size is None:
-            return None, None
-        return size * np.cos(angle), size * np.sin(angle)
+        return None if angle is None or size is None else size * part(angle)
 
     def _constant(self, key: str) -> float | None:
         """Return what the header says of the whole block, in SI units; None if nothing."""
@@ -241,8 +255,10 @@ class Readings:
                 f"{self.name}: the header says {name} {shown(found.value)}, more than a number can "
                 "be. Correct that line."
             )
-        unit = self._unit_given(key) or found.unit
-        unit = unit or self._unsaid(key, found.name, np.array([value]))
+        if not (unit := self._unit_given(key) or found.unit):
+            unit, unsaid = self._unsaid(key, found.name, np.array([value]))
+            if unsaid is not None:
+                self.unsaid[key] = unsaid
         self.used[key] = f"{name} {found.value} {shown(unit)} of the header"
         return value * quantities.factor_to_si(key, unit, found.name, self.name)
 

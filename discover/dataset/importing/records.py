@@ -4,21 +4,60 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
-from discover.dataset.importing.in_time import AT_REST, CONSTANT, spread, strain_of, up_and_down
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.names import tables_of
-from discover.dataset.importing.oscillations import alternates, goes_on
 from discover.dataset.importing.quantities import QUANTITIES, SAME_TEMPERATURE
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.recognition import Recognised
+from discover.dataset.importing.series import (
+    AT_REST,
+    CONSTANT,
+    Values,
+    alternates,
+    goes_on,
+    spread,
+    strain_of,
+    up_and_down,
+)
+from discover.dataset.importing.which_test import Recognised
 from discover.errors import InputError
 
-Values = Float[np.ndarray, " n"]
 Table = dict[str, Values]
 
 _REACHED = 0.95  # share of a step of strain from which on it counts as put on
+
+
+class _Needed(NamedTuple):
+    """What a kind of test has to have, besides, and which rows of it can be."""
+
+    kind: TestName
+    keys: tuple[str, ...]
+    besides: tuple[str, ...] = ()
+    positive: tuple[str, ...] = ()
+    why: str = ""  # of rows where something is not positive
+
+
+_NORMAL, _STEADY = ("N1", "N2"), ("shear_rate", "stress")
+_SWEEP, _SIZE = ("omega", "Gp", "Gpp"), ("strain_amplitude",)
+_MODULUS, _COMPLIANCE = ("time", "relaxation_modulus"), ("time", "compliance")
+_NO_MODULUS = "a modulus that is not positive, beyond the reach of the instrument"
+# of one kind that counts of which least is lacking, the first of several
+_NEEDED = (
+    _Needed("frequency_sweep", _SWEEP, (), _SWEEP, _NO_MODULUS),
+    _Needed("amplitude_sweep", (*_SIZE, *_SWEEP), (), _SIZE, "no strain"),
+    _Needed("amplitude_sweep", (*_SIZE, "Gp", "Gpp"), (), _SIZE, "no strain"),
+    _Needed("flow_curve", _STEADY, _NORMAL, _STEADY, "no steady flow"),
+    _Needed("run", ("time", "tensile_stress", "hencky_rate")),
+    _Needed("run", ("time", "tensile_stress", "hencky_strain")),
+    _Needed("run", ("time", "shear_rate", "stress"), (*_NORMAL, "strain")),
+    _Needed("run", ("time", "strain", "stress"), _NORMAL),
+    _Needed("relaxation", ("time", "strain", "stress"), _NORMAL),
+    _Needed("creep", ("time", "stress", "strain")),
+    _Needed("creep", ("time", "stress", "shear_rate")),
+    # as the instrument's software computed it
+    _Needed("relaxation", _MODULUS, (), _MODULUS, "no modulus"),
+    _Needed("creep", _COMPLIANCE, (), _COMPLIANCE, "no compliance"),
+)
 
 
 @dataclass
@@ -61,46 +100,43 @@ class Record:
             self.table = {key: values[rows] for key, values in self.table.items()}
 
 
-class _Needed(NamedTuple):
-    """What a kind of test has to have, besides, and which rows of it can be."""
-
-    keys: tuple[str, ...]
-    besides: tuple[str, ...] = ()
-    positive: tuple[str, ...] = ()
-    why: str = ""  # of rows where something is not positive
-
-
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
-    """Return the test that rows hold, after the one before; InputError names what it lacks."""
+    """Return the test that rows hold, after the one before it; InputError names what it lacks."""
     if found.kind == "none":
         return Record("none", {}, notes=[found.why])
-    needed = _needed(readings, found.kind)
-    made = _table(readings, found, needed)
+    of_kind = [one for one in _NEEDED if one.kind == found.kind]
+    needed = next((one for one in of_kind if readings.has(*one.keys)), None)
+    if needed is None:
+        needed = min(of_kind, key=lambda one: sum(not readings.has(key) for key in one.keys))
+    made = _taken(readings, found, needed)
     if "time" in made.table:
         _begin(made, readings)
-    both = [made.table[key] for key in ("shear_rate", "stress") if found.kind == "flow_curve"]
-    if both and np.median(both[0]) < 0.0 and np.median(both[1]) < 0.0:
-        made.table |= {"shear_rate": -both[0], "stress": -both[1]}
-        made.notes.append("rate and stress, both negative, are taken without their signs")
+    if made.kind == "flow_curve":
+        rate, stress = made.table["shear_rate"], made.table["stress"]
+        if np.median(rate) < 0.0 and np.median(stress) < 0.0:
+            made.table |= {"shear_rate": -rate, "stress": -stress}
+            made.notes.append("rate and stress, both negative, are taken without their signs")
     if needed.positive:
         made.keep(np.all([made.table[k] > 0.0 for k in needed.positive], axis=0), needed.why)
     if "tensile_stress" in made.table:
         flow = next((word for word in ("planar", "biaxial") if word in found.why), "uniaxial")
         made.conditions["flow"] = flow
         made.notes.append(f"taken as {flow}; write another flow in runs.csv if it is not")
-    elif found.kind == "amplitude_sweep":
+    elif made.kind == "amplitude_sweep":
         made.table = {"strain": made.table.pop("strain_amplitude"), **made.table}
         if "omega" not in made.table:
             made.notes.append(
                 "nothing says at which frequency: write amplitude_sweep_rad_s in the study, or a "
                 "line such as Frequency: 1 Hz above the numbers"
             )
-    elif found.kind == "flow_curve":
+    elif made.kind == "flow_curve":
         _note_steadiness(made, readings.get("time"))
-    elif found.kind == "relaxation" and made.is_run:
+    elif made.kind == "relaxation" and made.is_run:
         _after_step(made)
-    elif found.kind == "creep" and made.is_run:
-        made = _answered(made)
+    elif made.kind == "creep" and made.is_run:
+        if "strain" not in made.table:
+            made.notes.append("the strain is the integral of the rate from t = 0 on")
+        made.table, made.conditions["control"] = _with_strain(made.table), "stress"
     if made.kind in ("run", "creep") and "stress" in made.table:
         _note_alternation(made)
     temperature = readings.get("temperature")
@@ -109,34 +145,10 @@ def record(readings: Readings, found: Recognised, before: Record | None) -> Reco
     return made if before is None else _after(made, before)
 
 
-def _needed(readings: Readings, kind: TestName) -> _Needed:
-    normal, both, moduli, has = ("N1", "N2"), ("shear_rate", "stress"), ("Gp", "Gpp"), readings.has
-    if kind == "frequency_sweep":
-        why = "a modulus that is not positive, beyond the reach of the instrument"
-        return _Needed(("omega", *moduli), (), ("omega", *moduli), why)
-    if kind == "amplitude_sweep":
-        keys = ("strain_amplitude", *(("omega",) if has("omega") else ()), *moduli)
-        return _Needed(keys, (), ("strain_amplitude",), "no strain")
-    if kind == "flow_curve":
-        return _Needed(both, normal, both, "no steady flow")
-    if kind == "run" and has("tensile_stress"):
-        how = "hencky_rate" if has("hencky_rate") else "hencky_strain"
-        return _Needed(("time", "tensile_stress", how))
-    if kind == "run" and has("shear_rate"):
-        return _Needed(("time", "shear_rate", "stress"), (*normal, "strain"))
-    if kind == "run" or (kind == "relaxation" and has("stress", "strain")):
-        return _Needed(("time", "strain", "stress"), normal)
-    moved = "strain" if has("strain") else "shear_rate"
-    if kind == "creep" and has("stress", moved):
-        return _Needed(("time", "stress", moved))
-    # as the instrument's software computed it
-    what = "compliance" if kind == "creep" else "relaxation_modulus"
-    return _Needed(("time", what), (), ("time", what), f"no {what.rpartition('_')[2]}")
-
-
-def _table(readings: Readings, found: Recognised, needed: _Needed) -> Record:
+def _taken(readings: Readings, found: Recognised, needed: _Needed) -> Record:
     """Return the rows that have a number in every quantity, and how many have not."""
-    lacking = [key for key in needed.keys if readings.get(key) is None]
+    values = {key: readings.get(key) for key in (*needed.keys, *needed.besides)}
+    lacking = [key for key in needed.keys if values[key] is None]
     if lacking:
         what = found.kind.replace("_", " ")
         raise InputError(
@@ -144,7 +156,6 @@ def _table(readings: Readings, found: Recognised, needed: _Needed) -> Record:
             f'and no column is known as it. Name it, as in --column {lacking[0]}="its name", '
             "or take the block for another --test."
         )
-    values = {key: readings.get(key) for key in (*needed.keys, *needed.besides)}
     there = {key: column for key, column in values.items() if column is not None}
     rows = found.rows & np.all([np.isfinite(column) for column in there.values()], axis=0)
     if not rows.any():
@@ -159,10 +170,10 @@ def _table(readings: Readings, found: Recognised, needed: _Needed) -> Record:
 
 def _begin(made: Record, readings: Readings) -> None:
     """Count time from the start of the flow, and leave out times that do not go on."""
-    made.table["time"] = made.table["time"] - readings.mapping.start_time_s - readings.begins
+    time = made.table["time"] - readings.mapping.start_time_s - readings.begins
+    made.table["time"] = time
     if readings.begins:
         made.notes.append(f"time counts from the last sample before it, at {readings.begins:.4g} s")
-    time = made.table["time"]
     later = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     if 0 < np.sum(~later) <= max(2, 0.1 * len(time)):
         made.keep(later, "a time that was there already")
@@ -191,20 +202,6 @@ def _note_alternation(made: Record) -> None:
         made.notes.append("its cycles repeat from the first sample on: periodic steady state")
     else:
         made.notes.append("taken as an oscillation that starts from rest")
-
-
-def _answered(made: Record) -> Record:
-    """Return a test at a given stress, with the recovery that follows in the same block."""
-    if "strain" not in made.table:
-        made.notes.append("the strain is the integral of the rate from t = 0 on")
-    # the clock of a recovery may start again
-    starts = np.flatnonzero(np.diff(made.table["time"]) < -0.5 * made.table["time"][:-1]) + 1
-    pieces = zip(*(np.split(v, starts) for v in made.table.values()), strict=True)
-    first, *others = (_with_strain(dict(zip(made.table, p, strict=True))) for p in pieces)
-    made.table, made.conditions["control"] = first, "stress"
-    for other in others:
-        made = _followed(made, other)
-    return made
 
 
 def _with_strain(table: Table) -> Table:
@@ -275,12 +272,11 @@ def joined(creep: Record, recovery: Readings) -> Record | None:
     rows = recovery.whole(*keys)
     if not rows.any():
         return None
-    table = {key: recovery.get(key)[rows] for key in keys}  # type: ignore[index]
+    table = {key: recovery.known(key)[rows] for key in keys}
     level = float(np.median(np.abs(creep.table["stress"])))
     if np.percentile(np.abs(table["stress"]), 90.0) > AT_REST * level:
         return None
-    table["time"] = table["time"] - recovery.begins
-    table["stress"] = np.zeros(int(np.sum(rows)))
+    table |= {"time": table["time"] - recovery.begins, "stress": np.zeros(int(np.sum(rows)))}
     return _followed(creep, _with_strain(table))
 
 

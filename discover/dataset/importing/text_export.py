@@ -2,9 +2,8 @@
 
 One reader serves plain tables, TRIOS (text, CSV, "Export to LIMS" and spreadsheets; blocks headed
 ``[step]``), RheoCompass (``Interval data:``), rSpace and RheoWin: all are a line of names, perhaps
-a line of units, then lines of numbers, some of which begin with a word. What a block is called is
-read from the lines above it, or is that word. hermes-rheo 2.0.0 reads TRIOS' four lines alone, pins
-older scipy, pandas and matplotlib and brings piblin, mastercurves, openpyxl and numdifftools along.
+a line of units, then lines of numbers, some of which begin with a word. hermes-rheo 2.0.0 reads
+TRIOS' four lines alone, and pins older scipy, pandas and matplotlib.
 """
 
 import re
@@ -12,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -41,6 +39,7 @@ _DATA_POINT = "data point"
 _FEWEST = 3
 
 _LINES = alternatives("lines")
+_BEFORE_NAME = re.compile(_LINES["lines_of_a_name"], re.IGNORECASE)
 OF_TESTS = re.compile(
     rf"((?P<sample>{_LINES['samples']})|{_LINES['steps']})s?"
     r"( (name|id|no|nr|number|index|label))?#?"
@@ -95,7 +94,8 @@ class Block:
     def rows(self, chosen: Sequence[int] | np.ndarray) -> "Block":
         """Return the block of some rows, with what is read of them already."""
         kept = [int(i) for i in chosen]
-        part = replace(self, cells=tuple(self.cells[i] for i in kept))
+        line = self.line + (kept[0] if kept else 0)
+        part = replace(self, cells=tuple(self.cells[i] for i in kept), line=line)
         part.__dict__["numbers"] = self.numbers[:, kept]
         return part
 
@@ -119,7 +119,6 @@ def require_blocks(blocks: list[Block], name: str) -> list[Block]:
 def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     """Return the blocks of numbers among the cells of each line, with decimal points.
 
-    Lines that begin with a word, such as the number of a segment, are a block for each word.
     `header_row`: line of the names, where it is not that above the numbers; then one block.
     """
     blocks: list[Block] = []
@@ -268,61 +267,3 @@ def _name(rows: Rows, data: int) -> str:
         elif not title and sum(map(bool, row)) == 1 and _TITLE.fullmatch("".join(row)):
             title = "".join(row).strip("-=*#_~<>[]| ")
     return ", ".join(dict.fromkeys(word for word in reversed(found) if word)) or title
-
-
-_PATTERNS = {
-    test: re.compile(words, re.IGNORECASE) for test, words in alternatives("tests").items()
-}
-_BEFORE_NAME, _SAY_THE_TEST, _OTHERS_NAME = (
-    re.compile(_LINES[key], re.IGNORECASE)
-    for key in ("lines_of_a_name", "lines_of_a_test", "no_lines_of_a_test")
-)
-_LONGEST = 8  # words of a line beyond which it is prose, of which nothing is taken
-
-
-class Said(NamedTuple):
-    """What words say of a test."""
-
-    test: str  # of ``words.toml``
-    words: str  # as the file has them
-    by_file_name: bool = False  # nothing else says so, and the numbers overrule it
-
-
-def said_of(block: Block, file: str) -> Said | None:
-    """Return which test the words nearest to a block name; None if they name none, or several.
-
-    The name of its step comes first, then the lines above it, the nearest first, then the file's.
-    """
-    for words in (block.name, *_titles(block.above)):
-        if (test := _named(words)) is not None:
-            return Said(test, words)
-    test = _named(re.sub(r"[_-]+", " ", file.rpartition(".")[0] or file))
-    return None if test is None else Said(test, file, by_file_name=True)
-
-
-def _named(words: str) -> str | None:
-    found = {t: m.start() for t, pattern in _PATTERNS.items() if (m := pattern.search(words))}
-    if {"recovery", "creep"} <= set(found):  # one run, or "recovery after creep"
-        found.pop("creep" if found["recovery"] <= found["creep"] else "recovery")
-    if {"planar", "biaxial"} & set(found):
-        found.pop("uniaxial", None)
-    if {"loop", "intervals"} & set(found):  # made of ramps or of steps, and relaxing meanwhile
-        found = {test: at for test, at in found.items() if test in ("loop", "intervals")}
-    if {"flow_curve", "ramp"} <= set(found):
-        return "ramp"
-    return next(iter(found)) if len(found) == 1 else None
-
-
-def _titles(lines: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield lines that may say which test it is, the last first."""
-    for line in reversed(lines):
-        cells = [cell.strip(" #%:") for cell in line if cell.strip(" #%:")]
-        if not cells or len(cells) > 2:
-            continue  # names and units of columns
-        key, mark, value = re.sub(r"\s+", " ", ": ".join(cells)).partition(":")
-        if not mark:
-            key, mark, value = key.partition("=")
-        is_title = not mark or (_SAY_THE_TEST.search(key) and not _OTHERS_NAME.search(key))
-        words = value if mark else key
-        if is_title and len(words.split()) <= _LONGEST:
-            yield words.strip()

@@ -38,19 +38,17 @@ def is_clock(cell: str) -> bool:
 
 
 def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
-    """Return readings of a clock in s, nan where a cell is none.
+    """Return readings of a clock in s, nan where a cell is none; past midnight they go on.
 
-    Clocks of the day and time stamps count from the first, since they are later than the whole
-    record is long; past midnight they go on. `unit`: as the export writes it, such as ``hh:mm``.
+    Clocks of the day and time stamps count from the first. `unit`: as written, such as ``hh:mm``.
     """
     matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
     # is the first of May
-    found = [m for m in matches if m]
-    most = {key: max((int(m[key]) for m in found if m["second"]), default=0)
-            for key in ("first", "second")}  # fmt: skip
-    american = any(m["half"] and m["mark"] == "/" for m in found) and most["first"] <= 12
-    american = american or most["second"] > 12
+    dated = [m for m in matches if m and m["second"]]
+    american = any(m["half"] and m["mark"] == "/" for m in dated)
+    american = american and all(int(m["first"]) <= 12 for m in dated)
+    american = american or any(int(m["second"]) > 12 for m in dated)
     in_hours = re.fullmatch(r"h+\W?m+(?:in)?", unit.strip().lower()) is not None
     values = np.array([_reading(m, american, in_hours) for m in matches])
     known = np.isfinite(values)
@@ -59,7 +57,7 @@ def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
     clock = values[known]
     # a day goes by where a clock without a date falls back by more than half of one
     clock = clock + _DAY * np.cumsum(np.diff(clock, prepend=clock[0]) < -0.5 * _DAY)
-    if any(m["year"] or m["last"] for m in found) or clock[0] > max(np.ptp(clock), 60.0):
+    if any(m and (m["year"] or m["last"]) for m in matches) or clock[0] > max(np.ptp(clock), 60.0):
         clock = clock - clock[0]
     values[known] = clock
     return values
@@ -75,14 +73,13 @@ def _reading(match: re.Match | None, american: bool, in_hours: bool) -> float:
     if match["half"]:
         hours = hours % 12 + 12.0 * (match["half"][0] in "Pp")
     time = 3600.0 * hours + 60.0 * minutes + rest + _DAY * int(match["days"] or 0)
-    if not (match["year"] or match["last"]):
-        return time
     if match["year"]:
-        date = [match[key] for key in ("year", "month", "day")]
-    else:
+        date = match.group("year", "month", "day")
+    elif match["last"]:
         year = match["last"] if len(match["last"]) > 2 else f"20{match['last']}"
-        month, day = ("first", "second") if american else ("second", "first")
-        date = [year, match[month], match[day]]
+        date = year, *match.group(*(("first", "second") if american else ("second", "first")))
+    else:
+        return time
     try:
         return datetime(*map(int, date), tzinfo=UTC).timestamp() + time
     except ValueError:  # no such day
@@ -106,8 +103,7 @@ def read_rows(
 ) -> list[list[str]]:
     """Return the cells of every line of a text file, numbers with decimal points.
 
-    What is None is found from the file. Raises InputError if it cannot be read, or a decimal comma
-    may be of thousands.
+    Raises InputError if it cannot be read, or a decimal comma may be of thousands.
     """
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()

@@ -30,8 +30,7 @@ def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
     """Return the names of the runs of each test that was repeated.
 
     Two runs are one test if their rates agree, and every number that the source gives of their
-    conditions: over all of the longer run, or over the time that both cover if that is half of it.
-    States and runs at a given stress are passed over.
+    conditions, over the longer run, or over the time that both cover if that is half of it.
     """
     groups: list[list[Run]] = []
     for run in runs:
@@ -127,11 +126,7 @@ def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
 
 
 def require_loadings(runs: Sequence[Run], deviation: float | None) -> None:
-    """Refuse runs that cannot each be a loading of its own; None says nothing of loadings.
-
-    `deviation`, by which they differ, is relative. Raises InputError if they cannot differ so, or a
-    stress was imposed, which a factor changes otherwise.
-    """
+    """Refuse runs that cannot each be a loading of its own, by a relative `deviation`."""
     if deviation is None:
         return
     if not 0.0 < deviation <= LARGEST:
@@ -157,7 +152,6 @@ def total_strain(run: Run) -> float:
 def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
     """Return the runs with the strain that their sample had seen in earlier ones.
 
-    Only strains are added up: what a held-out run did to the sample is known without its stress.
     Runs of equal number in the `order`, such as start times, are parallel.
     """
     totals = np.array([total_strain(run) for run in runs])

@@ -27,8 +27,7 @@ def thin(
 ) -> tuple[Bool[np.ndarray, " n"], str]:
     """Return which samples of more than `MOST_SAMPLES` to keep, and a word on what was kept.
 
-    Kept are samples evenly spaced in log time, since a start-up has its information per decade, and
-    in time, since an oscillation has it per cycle; the ends; and the extremes of stress and rate.
+    Half are even in log time, where a start-up has its information, half in time, where cycles do.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
@@ -55,8 +54,7 @@ def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
 def thin_run(run: Run, most: int) -> Run:
     """Return a run with at most so many of its samples, 2 or more, evenly chosen in their order.
 
-    A rate that was read sample by sample is followed by straight lines between the samples kept,
-    and more where it varies faster (`followed_rate`). Its metadata say so under ``thinned``.
+    A rate that was read sample by sample is followed as well as `followed_rate` does.
     """
     n = len(run)
     if n <= most:
@@ -81,9 +79,8 @@ def followed_rate(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return times and rates of fewer knots, whose straight lines follow a rate read in samples.
 
-    The lines are a spline fitted by least squares to all samples, whose knots are the samples to
-    `keep` and more, until the strain is right to 0.1 % of its range and the rate to 5 % of its
-    largest.
+    A spline by least squares has knots at the samples to `keep` and more, until the strain is right
+    to 0.1 % of its range and the rate to 5 % of its largest.
     """
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)
@@ -126,10 +123,9 @@ def bends(place: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> np
 
 
 def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
-    """Return which samples are next to a step or a corner of what was imposed: rate or stress.
+    """Return which samples are next to a step or corner of rate or stress, whichever was imposed.
 
-    What is answered there may stand alone without a knock, as where the next interval of a
-    thixotropy test begins, or the way down of a loop.
+    What is answered there may stand alone without a knock.
     """
     imposed = run.stress if run.protocol.control == "stress" else run.rate
     beside = np.zeros(len(imposed), dtype=bool)
@@ -153,8 +149,7 @@ def without_spikes(run: Run) -> tuple[Run, list[float]]:
 def without_held_values(run: Run) -> Run:
     """Return a run with the first sample of each value, where samples hold values read before.
 
-    A value that is read again is late, and says nothing new: fitted, it is a lag and a noise with
-    neighbours alike. Its metadata say so under ``thinned``.
+    A value read again is late: fitted, it is a lag, and a noise with neighbours alike.
     """
     times = read_times(run.recorded)
     if times == 1:

@@ -8,7 +8,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +56,6 @@ class Table:
         names = [shown(column) for column in self.columns]
         more = f" and {len(names) - 12} more" if len(names) > 12 else ""
         return ", ".join(names[:12]) + more
-
-    def rows(self, chosen: Sequence[int]) -> "Table":
-        """Return the table of some rows, counted from 0."""
-        columns = {name: [cells[i] for i in chosen] for name, cells in self.columns.items()}
-        return replace(self, columns=columns, lines=[self.lines[i] for i in chosen])
 
     def numbers(self, column: str, factor: float = 1.0) -> Float[np.ndarray, " n"]:
         """Return a column times a factor, what is next to nothing as 0; InputError if no number."""
@@ -218,39 +213,33 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     name = path.name if name is None else name
     text = _decode(read_bytes(path, name, if_missing), name)
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
-    header: list[str] = []
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    start, ragged, why = 1, [], ""
+    rows: list[tuple[int, list[str]]] = []  # with the line on which each begins
+    before = 0
     try:
         for cells in reader:
-            first, start = start, reader.line_num + 1
-            if not any(cell.strip() for cell in cells):
-                continue
-            if not header:
-                header = _header(cells, first, name)
-                continue
-            rows.append(cells)
-            lines.append(first)
-            if len(cells) != len(header):
-                ragged.append(first)
-                of_numbers = all(is_number(cell.strip()) for cell in cells)
-                commas = len(cells) > len(header) and of_numbers
-                why = why or (
-                    f"line {first} has {len(cells)} cells, the header {len(header)}. "
-                    + ("Decimal commas look so too: write decimal points." if commas
-                       else "Correct that line.")
-                )  # fmt: skip
+            line, before = before + 1, reader.line_num
+            if any(cell.strip() for cell in cells):
+                rows.append((line, cells))
     except csv.Error as error:
-        ragged, why = [start], f"line {start} ({error}). Fix the quotes there."
-    if ragged:
-        raise InputError(f"{name} is not a comma-separated table: {why}{_like_it(ragged)}")
-    if not header:
+        why = f"line {before + 1} ({error}). Fix the quotes there."
+        raise InputError(f"{name} is not a comma-separated table: {why}") from None
+    if not rows:
         raise InputError(f"{name} is empty; it must hold a header and rows. Add them.")
+    (line, cells), *rows = rows
+    header = _header(cells, line, name)
     if not rows:
         raise InputError(f"{name} has a header but no rows. Add the samples, or remove the file.")
-    columns = {column: [row[i].strip() for row in rows] for i, column in enumerate(header)}
-    return Table(name, columns, lines)
+    if ragged := [row for row in rows if len(row[1]) != len(header)]:
+        line, cells = ragged[0]
+        commas = len(cells) > len(header) and all(is_number(cell.strip()) for cell in cells)
+        remedy = "Decimal commas look so too: write decimal points."
+        raise InputError(
+            f"{name} is not a comma-separated table: line {line} has {len(cells)} cells, the "
+            f"header {len(header)}. {remedy if commas else 'Correct that line.'}"
+            f"{_like_it([line for line, _ in ragged])}"
+        )
+    columns = {column: [row[i].strip() for _, row in rows] for i, column in enumerate(header)}
+    return Table(name, columns, [line for line, _ in rows])
 
 
 def table_in(root: Path, name: str) -> Table | None:

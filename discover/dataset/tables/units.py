@@ -5,7 +5,7 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Sequence
-from functools import cache, reduce
+from functools import cache
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -32,7 +32,8 @@ def _spellings() -> dict[str, str]:
 _JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
 _NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev|r|obr|ot|giri|omw)\.?/min\b")
 _DIMENSIONS = ("[mass]", "[length]", "[time]")
-# units without a dimension; pint counts constants such as pi among them
+_POWER = r"((?:[^\W\d_]|[°%])+)(?:\^?(-?[1-9]))?(?![\d^-])"  # a word with its exponent
+# units without a dimension
 _NUMBERS = ("radian", "degree", "turn", "percent", "ppm")
 
 
@@ -43,22 +44,16 @@ class Unit(NamedTuple):
     dimension: tuple[int, int, int] = (0, 0, 0)  # exponents of kg, m and s; angles have none
     cycles: bool = False  # it counts them, as Hz does: 2π rad/s where an angle is meant
 
-    def times(self, other: "Unit", exponent: int = 1) -> "Unit":
-        """Return this unit times a power of another."""
-        kg, m, s = (a + exponent * b for a, b in zip(self.dimension, other.dimension, strict=True))
-        factor = self.factor * other.factor**exponent
-        return Unit(factor, (kg, m, s), self.cycles or other.cycles)
-
 
 def read_heading(suffix: str) -> Unit | None:
     """Return the unit that ends a column's name, ``dyn_cm2`` being dyn/cm²; None if none."""
-    first, *below = suffix.split("_")
-    if len(suffix) > _LONGEST or (first == "1" and not below):
-        return None
-    powers = [Unit() if first == "1" else _power(first), *map(_power, below)]
-    return None if None in powers else reduce(lambda a, b: a.times(b, -1), powers)  # pyright: ignore
+    words = suffix.split("_")
+    plain = all(re.fullmatch(_POWER, word) for word in words[words[0] == "1" :])
+    known = plain and suffix != "1" and len(suffix) <= _LONGEST
+    return _product("/".join(words)) if known else None
 
 
+@cache
 def read_unit(text: str) -> Unit | None:
     """Return a unit as exports write it, or None if it is none.
 
@@ -68,12 +63,12 @@ def read_unit(text: str) -> Unit | None:
     text = tidy_unit(text)
     if text in ("", "-", "--", "1"):
         return Unit()
-    if len(text) > _LONGEST:
-        return None
     text = _JOINED.sub(r"\1*\2", _NUMBERS_PER_MINUTE.sub("turn/min", text))
-    tokens = re.findall(r"(?:[^\W\d_]|[°%])++(?:\^?-?[0-9]++)?|[0-9]++|[()/*.]|\S", text)
-    found, rest = _product(tokens)
-    return None if rest else found
+    text = re.sub(r"[. ]+", "*", re.sub(r" *([/*()]) *", r"\1", text))
+    text = re.sub(r"(?<=[^(/*])\(", "*(", f"1{text}" if text.startswith("/") else text)
+    if len(text) > _LONGEST or not re.fullmatch(rf"(?:{_POWER}|1(?=[/*])|/(?!/)|[()*])+", text):
+        return None
+    return _product(text)
 
 
 def tidy_unit(text: str) -> str:
@@ -128,42 +123,10 @@ def _is_unit(text: str) -> bool:
     return read_unit(text) is not None or tidy_unit(text).lstrip("°") in ("C", "K", "F")
 
 
-def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
-    """Return the unit that the tokens begin with, and the tokens after it."""
-    found, sign = Unit(), 1
-    expected = True  # a word, not an operator
-    if len(tokens) > 1 and tokens[0] == "/":  # the 1 of 1/s is left out
-        sign, tokens = -1, tokens[1:]
-    while tokens and tokens[0] != ")":
-        token, tokens = tokens[0], tokens[1:]
-        if token in "/*." and not expected:
-            sign, expected = (-1 if token == "/" else 1), True
-            continue
-        if token == "(":
-            inner, tokens = _product(tokens)
-            if inner is None or not tokens:
-                return None, tokens
-            tokens = tokens[1:]
-        else:
-            inner = Unit() if token == "1" else _power(token)
-        if inner is None:
-            return None, tokens
-        found = found.times(inner, sign)
-        sign, expected = 1, False
-    return (None if expected else found), tokens
-
-
-def _power(text: str) -> Unit | None:
-    """Return a word with its exponent, such as cm2 or s^-1."""
-    match = re.fullmatch(r"((?:[^\W\d_]|[°%])+)\^?(-?[1-9])?", text)
-    word = None if match is None else _word(match[1])
-    return None if match is None or word is None else Unit().times(word, int(match[2] or 1))
-
-
 @cache
-def _word(text: str) -> Unit | None:
-    """Return a single word, such as kPa or seconds, from pint."""
-    word, parse = _spellings().get(text, text), _registry().parse_unit_name
+def _name(word: str) -> str:
+    """Return pint's name of a single word, such as kPa or seconds; ``?`` if it is no unit."""
+    word, parse = _spellings().get(word, word), _registry().parse_unit_name
     # whole words may begin with a capital; of short symbols the case has a meaning
     for name in (word, word.lower()) if len(word) > 2 else (word,):
         parsed, symbol = parse(name), name.removesuffix("s")
@@ -171,13 +134,28 @@ def _word(text: str) -> Unit | None:
         plural = len(name) <= 4 and symbol != name and parsed[:1] == parse(symbol)[:1]
         if not parsed or plural:
             continue
-        unit = _registry().Unit(parsed[0][0] + parsed[0][1])
-        size = _registry().Quantity(1.0, unit).to_base_units()
-        found = dict(size.dimensionality)
-        if set(found) <= set(_DIMENSIONS) and (found or str(unit).endswith(_NUMBERS)):
-            kg, m, s = (round(float(str(found.get(key, 0)))) for key in _DIMENSIONS)
-            return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
-    return None
+        unit = parsed[0][0] + parsed[0][1]
+        # pint counts constants such as pi among units without a dimension
+        if unit.endswith(_NUMBERS) or not _registry().Unit(unit).dimensionless:
+            return unit
+    return "?"
+
+
+def _product(text: str) -> Unit | None:
+    """Return the unit of words with ``*``, ``/`` and brackets; None if none of kg, m and s."""
+    text = re.sub(_POWER, lambda m: f"{_name(m[1])}**{m[2] or 1}", text)
+    if "?" in text:
+        return None
+    try:
+        unit = _registry().parse_units(text)
+    except Exception:  # each wrong order of signs fails in its own way
+        return None
+    size = _registry().Quantity(1.0, unit).to_base_units()
+    found = dict(size.dimensionality)
+    if not set(found) <= set(_DIMENSIONS):
+        return None
+    kg, m, s = (round(float(str(found.get(key, 0)))) for key in _DIMENSIONS)
+    return Unit(float(size.magnitude), (kg, m, s), "hertz" in text)
 
 
 @cache

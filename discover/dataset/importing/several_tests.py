@@ -1,4 +1,4 @@
-"""The tests that one table holds: side by side, one below the other, or row by row in turn.
+"""The tests of one file: side by side in a table, one below the other, row by row in turn.
 
 What repeats tells them apart: a word or number in a column of its own, a temperature, a set value,
 a clock or a series of rates that starts again.
@@ -7,11 +7,11 @@ a clock or a series of rates that starts again.
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from discover.dataset.importing import quantities
 from discover.dataset.importing.mapping import Mapping
@@ -177,110 +177,100 @@ _BACK = 0.1  # share of the way so far, within which a clock is back at its star
 _MOSTLY = 0.6  # share of steps in one direction, from which on values go that way
 
 
-@dataclass(frozen=True)
-class _Piece:
-    """Rows of one test, and whether those before are of another sample or temperature."""
-
-    rows: Int[np.ndarray, " m"]
-    apart: bool = False
-    told_by: tuple[int, ...] = ()
-
-    def by_value(self, values: np.ndarray, column: int) -> "list[_Piece]":
-        """Rows of each value of a column, shape (m,), in order; all of them if one has few."""
-        _, first, group = np.unique(values, return_index=True, return_inverse=True)
-        if len(first) < 2 or np.min(np.bincount(group)) < _FEWEST:
-            return [self]
-        told = (*self.told_by, column)
-        return [_Piece(self.rows[group == k], True, told) for k in np.argsort(first)]
-
-
-def tests_in_rows(block: Block, mapping: Mapping, name: str) -> list[Block]:
+def tests_in_rows(block: Block, mapping: Mapping, file: str) -> list[Block]:
     """Return the tests that stand one below the other, or row by row in turn."""
-    readings = Readings.of(block, mapping, name)
-    pieces = [_Piece(np.arange(len(readings)), block.apart)]
+    parts = [block]
     for split in (_by_words, _by_temperature, _by_restart, _by_set_value):
-        pieces = [part for piece in pieces for part in split(readings, piece)]
-    if len(pieces) == 1:
+        parts = [part for one in parts for part in split(Readings.of(one, mapping, file))]
+    if len(parts) == 1:
         return [block]
+    names = [name for name, _ in block.columns]
+    values = [[{row[i] for row in part.cells} for part in parts] for i in range(len(names))]
     # the columns that have one value in each of the tests, and not one in all
-    told_by = []
-    for i in range(len(block.columns)):
-        values = [{block.cells[int(row)][i] for row in piece.rows} for piece in pieces]
-        if all(len(one) == 1 for one in values) and len(set.union(*values)) > 1:
-            told_by.append(i)
-    parts = []
-    for piece in pieces:
-        told = tuple(dict.fromkeys((*piece.told_by, *told_by)))
-        start = int(piece.rows[0])
-        first, line = block.cells[start], block.line + start
-        named = ((first[i], *block.columns[i]) for i in told[:2])
+    one_each = [
+        name
+        for name, of in zip(names, values, strict=True)
+        if all(len(one) == 1 for one in of) and len(set.union(*of)) > 1
+    ]
+    found = []
+    for part in parts:
+        told_by = dict.fromkeys((*part.told_by, *one_each))
+        places = [names.index(name) for name in tuple(told_by)[:2]]
+        named = ((part.cells[0][i], *block.columns[i]) for i in places)
         said = (f"{name} {cell} {unit}".strip() if is_number(cell) else cell
                 for cell, name, unit in named)  # fmt: skip
-        label = ", ".join(said) or f"from line {line} on"
+        label = ", ".join(said) or f"from line {part.line} on"
         own = ", ".join(filter(None, (block.name, label)))
-        names = tuple(block.columns[i][0] for i in told)
-        part = block.rows(piece.rows)
-        parts.append(replace(part, name=own, line=line, apart=piece.apart, told_by=names))
-    return parts
+        found.append(replace(part, name=own, told_by=tuple(told_by)))
+    return found
 
 
-def _by_words(readings: Readings, piece: _Piece) -> list[_Piece]:
+def _by_value(block: Block, values: np.ndarray, column: int) -> list[Block]:
+    """Rows of each value of a column, shape (n,), in order; all of them if one has few."""
+    _, first, group = np.unique(values, return_index=True, return_inverse=True)
+    if len(first) < 2 or np.min(np.bincount(group)) < _FEWEST:
+        return [block]
+    told_by = *block.told_by, block.columns[column][0]
+    parts = (block.rows(np.flatnonzero(group == k)) for k in np.argsort(first))
+    return [replace(part, apart=True, told_by=told_by) for part in parts]
+
+
+def _by_words(readings: Readings) -> list[Block]:
     """Split where a column says of which sample, run or step a row is."""
-    for i, (name, _) in enumerate(readings.block.columns):
+    block = readings.block
+    for i, (name, _) in enumerate(block.columns):
         if found := OF_TESTS.fullmatch(plain_words(name)):
-            words = np.array([readings.block.cells[int(row)][i] for row in piece.rows])
-            parts = piece.by_value(words, i)
+            parts = _by_value(block, np.array([row[i] for row in block.cells]), i)
             if len(parts) > 1:
                 return parts if found["sample"] else [replace(one, apart=False) for one in parts]
-    return [piece]
+    return [block]
 
 
-def _by_temperature(readings: Readings, piece: _Piece) -> list[_Piece]:
+def _by_temperature(readings: Readings) -> list[Block]:
     """Split where readings of temperature gather about a few values, other than along a record."""
-    column = readings.alone("temperature")
-    degrees = np.empty(0) if column is None else column[piece.rows]
-    known = np.isfinite(degrees)
-    if np.sum(known) < 2 * _FEWEST:
-        return [piece]
-    time = _values(readings, "time", piece)
-    if time is not None and np.all(np.diff(time) > 0.0) and not _sweeps(readings, piece):
-        return [piece]
+    degrees = readings.alone("temperature")
+    known = np.zeros(0, bool) if degrees is None else np.isfinite(degrees)
+    if degrees is None or np.sum(known) < 2 * _FEWEST:
+        return [readings.block]
+    time = _values(readings, "time")
+    if time is not None and np.all(np.diff(time) > 0.0) and not _sweeps(readings):
+        return [readings.block]
     order = np.sort(degrees[known])
     cuts = order[1:][np.diff(order) > quantities.SAME_TEMPERATURE]
-    cuts = cuts - 0.5 * quantities.SAME_TEMPERATURE
-    group = np.searchsorted(cuts, degrees)
+    group = np.searchsorted(cuts - 0.5 * quantities.SAME_TEMPERATURE, degrees)
     # a row without a reading is at the temperature of that before it
     group = group[np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))]
     spreads = [np.ptp(degrees[known & (group == k)]) for k in np.unique(group)]
-    drifts = max(spreads) > _DRIFT
-    return [piece] if drifts else piece.by_value(group, readings.columns["temperature"])
+    if max(spreads) > _DRIFT:
+        return [readings.block]
+    return _by_value(readings.block, group, readings.columns["temperature"])
 
 
-def _by_set_value(readings: Readings, piece: _Piece) -> list[_Piece]:
+def _by_set_value(readings: Readings) -> list[Block]:
     """Split by the column whose values, held over rows, leave a clock that only rises in each."""
-    time = _values(readings, "time", piece)
+    block, time = readings.block, _values(readings, "time")
     if time is None or np.all(np.diff(time) > 0.0):
-        return [piece]
-    best = [piece]
-    for i in range(len(readings.block.columns)):
-        if i == readings.columns["time"]:
+        return [block]
+    best, changes = [block], 0
+    for i in range(len(block.columns)):
+        cells = np.array([row[i] for row in block.cells])
+        values = np.unique(cells)
+        if i == readings.columns["time"] or len(values) > len(cells) // _FEWEST:
             continue
-        cells = np.array([readings.block.cells[int(row)][i] for row in piece.rows])
-        if len(np.unique(cells)) > len(cells) // _FEWEST:
-            continue
-        parts = piece.by_value(cells, i)
-        rises = all(np.all(np.diff(time[np.isin(piece.rows, part.rows)]) > 0.0) for part in parts)
+        parts = _by_value(block, cells, i)
+        rises = all(np.all(np.diff(time[cells == value]) > 0.0) for value in values)
         if len(parts) > 1 and rises and (len(best) == 1 or len(parts) < len(best)):
-            best = parts
+            best, changes = parts, np.count_nonzero(cells[1:] != cells[:-1])
     # one after the other, as creep and recovery are, they may be one sample's
-    in_turn = all(np.all(np.diff(part.rows) == 1) for part in best)
-    return [replace(part, apart=piece.apart) for part in best] if in_turn else best
+    in_turn = changes < len(best)
+    return [replace(part, apart=block.apart) for part in best] if in_turn else best
 
 
-def _by_restart(readings: Readings, piece: _Piece) -> list[_Piece]:
+def _by_restart(readings: Readings) -> list[Block]:
     """Split where the clock, the frequencies or the rates start again."""
+    block = readings.block
     for key in ("time", "omega", "shear_rate"):
-        values = _values(readings, key, piece)
+        values = _values(readings, key)
         if values is None or (key == "omega" and _strain_varies(readings)):
             continue
         if key != "time":
@@ -288,11 +278,9 @@ def _by_restart(readings: Readings, piece: _Piece) -> list[_Piece]:
         elif np.mean(np.diff(values) > 0.0) < _MOSTLY:
             continue
         if cuts := _restarts(values):
-            first, *later = np.split(piece.rows, cuts)
-            apart = key != "time"
-            return [replace(piece, rows=first), *(replace(piece, rows=rows, apart=apart)
-                                                  for rows in later)]  # fmt: skip
-    return [piece]
+            first, *later = map(block.rows, np.split(np.arange(len(values)), cuts))
+            return [first, *(replace(part, apart=key != "time") for part in later)]
+    return [block]
 
 
 def _restarts(values: Float[np.ndarray, " m"]) -> list[int]:
@@ -311,17 +299,17 @@ def _restarts(values: Float[np.ndarray, " m"]) -> list[int]:
     return cuts if np.min(np.diff([0, *cuts, len(values)])) >= _FEWEST else []
 
 
-def _values(readings: Readings, key: str, piece: _Piece) -> Float[np.ndarray, " m"] | None:
-    """Return a column of its own in the rows of a test; None if it lacks one in some."""
+def _values(readings: Readings, key: str) -> Float[np.ndarray, " m"] | None:
+    """Return a column of its own; None if some row lacks a number, or there are few."""
     values = readings.unless_wrong(key) if key in readings.columns else None
-    values = np.empty(0) if values is None else values[piece.rows]
-    return values if len(values) > 2 * _FEWEST - 1 and np.all(np.isfinite(values)) else None
+    enough = values is not None and len(values) >= 2 * _FEWEST and np.all(np.isfinite(values))
+    return values if enough else None
 
 
-def _sweeps(readings: Readings, piece: _Piece) -> bool:
+def _sweeps(readings: Readings) -> bool:
     """Return whether frequencies or rates go from row to row: a table, no record in time."""
     for key in ("omega", "shear_rate"):
-        values = _values(readings, key, piece)
+        values = _values(readings, key)
         if values is not None and len(np.unique(values)) > len(values) // 4:
             size = np.abs(values)
             if np.max(size) > 3.0 * np.percentile(size, 5.0):
