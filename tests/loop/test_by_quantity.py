@@ -38,8 +38,8 @@ def result(records, left=0.06, **more):
                         "grows_with_rate": None},
         "spread_of_laws": {"N1": Spread(0.6, 0.8), "uniaxial": Spread(1.2, 1.3)},
         "verdict": "unexplained", "material": None, "stages": (), "tolerance": 0.05,
-        "free_form": (), "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
-        "remaining": {}, "declared_parameters": {},
+        "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
+        "remaining": {}, "declared_parameters": {}, "free_form": (),
     }  # fmt: skip
     return SimpleNamespace(**(found | more))
 
