@@ -16,7 +16,8 @@ from discover.forward import DeclaredModel
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
-from discover.inference.engine.free_functions import FreeForm, free_functions
+from discover.inference.engine.free_form import FreeForm
+from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.search import Search
 from discover.linear_algebra_threads import in_one_thread

@@ -24,7 +24,7 @@ from discover.equations.equation import box_of, flow_numbers, mean_relaxation_ti
 from discover.equations.parts import LawParts
 from discover.errors import InputError
 from discover.inference.engine.design import NextTests
-from discover.inference.engine.free_functions import FreeForm
+from discover.inference.engine.free_form import FreeForm
 from discover.laws import Fluid
 from discover.loop import parts
 from discover.loop.answering import loop_answer

@@ -12,7 +12,7 @@ from discover.effects import AbstractEffect
 from discover.inference.engine import Indistinguishable, Posterior
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.free_functions import FreeForm
+from discover.inference.engine.free_form import FreeForm
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search
 from discover.loop.parts import ErrorPair, Explanation, Explanations, Verdict

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -12,22 +12,14 @@ from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.free_form import FreeFunction
 from discover.inference.engine.left_out import FEWEST_RUNS, by_first_order, by_left_out, left_out
 from discover.inference.engine.noise import LEAST
-from discover.inference.engine.problem import Problem
+from discover.inference.engine.problem import LOG_ODDS_OF_NONE, Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
 from discover.linear_algebra_threads import in_one_thread
 from discover.statistics.noise.whiteness import FEWEST_TESTED, smooth_misfit_probability
-
-if TYPE_CHECKING:
-    from discover.inference.engine.free_functions import FreeFunction
-
-NONE = 0.3
-"""Prior probability that something has no name; on development seeds of judged worlds anything from
-0.2 to 0.5 is as good, and records that cannot tell are not called unexplained."""
-
-LOG_ODDS_OF_NONE = float(np.log(NONE / (1.0 - NONE)))
 
 WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
@@ -104,7 +96,7 @@ class Posterior:
     fits: tuple[tuple[Fit, float], ...]
     left: Discrepancy | None
     by_left_out: tuple[tuple[Fit, float], ...] = ()
-    curves: tuple["FreeFunction", ...] = ()
+    curves: tuple[FreeFunction, ...] = ()
     memory: dict = field(default_factory=dict)
 
     @property
@@ -124,7 +116,7 @@ class Posterior:
                 found[id(fit)] = fit, share * weight + found.get(id(fit), (fit, 0.0))[1]
         return tuple(sorted(found.values(), key=lambda pair: -pair[1]))
 
-    def with_curves(self, curves: Sequence["FreeFunction"]) -> "Posterior":
+    def with_curves(self, curves: Sequence[FreeFunction]) -> "Posterior":
         """Return the posterior with functions among what may be there and has no name."""
         log_odds = float(np.logaddexp.reduce([curve.weight for curve in curves]))
         share = 1.0 / (1.0 + float(np.exp(min(log_odds, 700.0))))

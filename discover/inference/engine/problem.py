@@ -33,6 +33,12 @@ _FEW = 30.0
 _STARTS = (1.0, 0.2, 5.0, 0.04)
 """Multiples of the first trial of an inner time from which fits start."""
 
+NONE = 0.3
+"""Prior probability that something has no name; on development seeds of judged worlds anything from
+0.2 to 0.5 is as good, and records that cannot tell are not called unexplained."""
+
+LOG_ODDS_OF_NONE = float(np.log(NONE / (1.0 - NONE)))
+
 TERM_ODDS = 0.15
 """Prior odds of a term that no law is known by, over those of an effect with a name."""
 
