@@ -67,7 +67,7 @@ def compare(
         Fitted estimators, one of each learner at most, or a data set.
     second
         The data set that tests estimators; for a data set the known `Fluid`, by default that of its
-        linear sweep, and without one upper-convected Maxwell with G = 1 Pa and λ = 1 s.
+        linear sweep, and without one a mode of Maxwell, which is fitted.
     train
         What estimators from a file were fitted to; the file holds no data.
     held_out

@@ -265,12 +265,12 @@ def from_dataframe(
     by_run = _by_run(samples, name)
     with TemporaryDirectory() as folder:
         for run, table in by_run.items():
-            table.to_csv(Path(folder) / run, index=False)
+            _write(table, Path(folder) / run)
         index = pd.DataFrame({"file": list(by_run)}) if runs is None else _index(runs, by_run)
         if len(index):
-            index.to_csv(Path(folder) / INDEX_FILE, index=False)
+            _write(index, Path(folder) / INDEX_FILE)
         for kind, table in tables.items():
-            table.to_csv(Path(folder) / f"{kind}.csv", index=False)
+            _write(table, Path(folder) / f"{kind}.csv")
         if not any(Path(folder).iterdir()):
             raise InputError("There is no sample and no table; give one with samples at least.")
         return _read_folder(Path(folder), name, **options)
@@ -280,6 +280,11 @@ def _flat(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with the named levels of its index as columns."""
     named = [n for n in table.index.names if isinstance(n, str) and n not in table.columns]
     return (table.reset_index(level=named) if named else table).reset_index(drop=True)
+
+
+def _write(table: pd.DataFrame, path: Path) -> None:
+    """Write a table; half a character, which no file can hold, is spelled out."""
+    table.to_csv(path, index=False, errors="backslashreplace")
 
 
 def _can_name_a_run(name: object) -> bool:

@@ -187,7 +187,14 @@ def _failed(result: Any) -> str:
 
 
 def _alternative(result: Any) -> str:
-    """Return which explanation is the next likeliest; empty where the law is settled."""
+    """Return which explanation is the next likeliest; empty where the law is settled.
+
+    Or which describes the same, to the last digit.
+    """
+    if twin := result.remaining.get("oil_twin"):
+        thick, rises = significant(twin["viscosity"], 3), significant(twin["rise_time"], 2)
+        tool = f" and a tool of {significant(twin['inertia'], 2)} Pa s²" * bool(twin["inertia"])
+        return f"An oil of {thick} Pa s behind a motor with t_m = {rises} s{tool} records the same."
     told = result.explanations
     own = told.holding([stage.effect for stage in result.stages])
     if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:

@@ -14,10 +14,12 @@ from scipy.stats import chi2
 from discover.effects import AbstractEffect
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
+from discover.identify.oil_twin import oil_twin
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
+from discover.laws import UpperConvectedMaxwell
 from discover.loop import final_model
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.loop_result import LoopResult
@@ -33,6 +35,7 @@ from discover.loop.parts import (
 )
 from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
+from discover.loop.sentences import EXPLAINED
 from discover.statistics.residual import noise_beside
 from discover.words import percent_of
 
@@ -241,6 +244,7 @@ class Ended(Path):
             "autocorrelation": fit.noise.correlation,
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
+            "oil_twin": self._oil_twin(),
             "bench": self._bench(),
             "description": said + self._in_words(),
             "step_instants": {}
@@ -279,6 +283,28 @@ class Ended(Path):
         if self.verdict == "unexplained":
             text = f"An effect is still missing or has another form. {text}"
         return text
+
+    def _oil_twin(self) -> dict[str, float] | None:
+        """Return the oil behind a slow motor that records the same; None where none does.
+
+        Nor where the relaxation time is known, or a motor or another effect on the rate is.
+        """
+        model, declared = self.posterior.problem.model, self.posterior.problem.declared
+        names = [*self.fit.names, *(known.name for known in declared.effects)]
+        others = [one for one in model.effects if one.name in names]
+        others = [one for one in others if one.name != "solvent_viscosity"]
+        fluid = final_model.augmented_fluid(model, self.theta, names)
+        if (
+            self.verdict not in EXPLAINED
+            or 1 not in declared.free_positions
+            or fluid.n_modes > 1
+            or not isinstance(declared.law, UpperConvectedMaxwell)
+            or any(one.kind != "signal" or one.name == "instrument_inertia" for one in others)
+        ):
+            return None
+        mode = float(fluid.modulus[0]), float(fluid.relaxation_time[0])
+        twin = oil_twin(*mode, float(fluid.solvent_viscosity), self.posterior.problem.fitted.runs)
+        return None if twin is None else twin._asdict()
 
     def _bench(self) -> dict[str, float]:
         """Return by how much a sound bench is off here, as fitted jointly: its nuisances."""
