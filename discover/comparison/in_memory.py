@@ -106,7 +106,7 @@ def compare(
         if train is not None:
             raise InputError("train is for estimators from a file; leave it out.")
         data = data_in_memory(first, held_out)
-        model = with_known(declared_fluid(second, first), known_effects, free)
+        model = with_known(declared_fluid(second, data.dataset), known_effects, free)
         study = _study(data, model, options, tolerance)
         return compare_study(study, seed, say, data=data, declared=model)
     judging = not isinstance(held_out, Sized) or len(held_out) > 0

@@ -263,14 +263,16 @@ def from_dataframe(
     if unknown := [kind for kind in tables if kind not in _KINDS]:
         raise InputError(unknown_name("table", unknown[0], _KINDS))
     by_run = _by_run(samples, name)
+    # half a character, which no file can hold, is spelled out
+    as_text: dict[str, Any] = {"index": False, "errors": "backslashreplace"}
     with TemporaryDirectory() as folder:
         for run, table in by_run.items():
-            _write(table, Path(folder) / run)
+            table.to_csv(Path(folder) / run, **as_text)
         index = pd.DataFrame({"file": list(by_run)}) if runs is None else _index(runs, by_run)
         if len(index):
-            _write(index, Path(folder) / INDEX_FILE)
+            index.to_csv(Path(folder) / INDEX_FILE, **as_text)
         for kind, table in tables.items():
-            _write(table, Path(folder) / f"{kind}.csv")
+            table.to_csv(Path(folder) / f"{kind}.csv", **as_text)
         if not any(Path(folder).iterdir()):
             raise InputError("There is no sample and no table; give one with samples at least.")
         return _read_folder(Path(folder), name, **options)
@@ -280,11 +282,6 @@ def _flat(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with the named levels of its index as columns."""
     named = [n for n in table.index.names if isinstance(n, str) and n not in table.columns]
     return (table.reset_index(level=named) if named else table).reset_index(drop=True)
-
-
-def _write(table: pd.DataFrame, path: Path) -> None:
-    """Write a table; half a character, which no file can hold, is spelled out."""
-    table.to_csv(path, index=False, errors="backslashreplace")
 
 
 def _can_name_a_run(name: object) -> bool:

@@ -271,7 +271,7 @@ def _first(
     names: Mapping[int, str],
     start: Mapping[str, float],
     declared: StudyModel,
-) -> Float[np.ndarray, " p"]:
+) -> Theta:
     """Return the first start of the fit: as declared."""
     first = np.clip(model.zero(), model.low, model.high)
     for position, name in names.items():

@@ -6,34 +6,26 @@ is that of a solvent beside a smaller mode.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from discover.dataset import Run
 from discover.effects.registry import make_effect
 
 
-class OilBehindMotor(NamedTuple):
-    """Viscosity in Pa s, rise time of the motor in s, inertia in Pa s²."""
-
-    viscosity: float
-    rise_time: float
-    inertia: float
-
-
 def oil_twin(
     modulus: float, time: float, solvent: float, runs: Sequence[Run]
-) -> OilBehindMotor | None:
-    """Return the oil that records in runs what a Maxwell mode with a solvent does; None without.
+) -> dict[str, float] | None:
+    """Return viscosity, rise time and inertia that record in runs what a Maxwell mode does.
 
-    N1, extension and a rate measured at the tool tell the two apart; and no motor is that slow.
+    None where N1, extension or a rate measured at the tool tells the two apart, and where no motor
+    is that slow. All in units of Pa and s; `solvent`: the viscosity beside the mode.
     """
-    if not all(
-        run.flow == "shear" and run.quantity == "sigma12" and run.protocol.control == "rate"
-        and not run.rate_is_measured for run in runs
-    ):  # fmt: skip
-        return None
-    (slowest,) = make_effect("rate_rise_time").parameters
-    (heaviest,) = make_effect("instrument_inertia").parameters
-    if time > slowest.high or solvent * time > heaviest.high:
-        return None
-    return OilBehindMotor(modulus * time + solvent, time, solvent * time)
+    found = {"viscosity": modulus * time + solvent, "rise_time": time, "inertia": solvent * time}
+    rise, inertia = (
+        make_effect(name).parameters[0] for name in ("rate_rise_time", "instrument_inertia")
+    )
+    told = any(
+        (run.flow, run.quantity, run.protocol.control) != ("shear", "sigma12", "rate")
+        or run.rate_is_measured
+        for run in runs
+    )
+    return None if told or time > rise.high or solvent * time > inertia.high else found

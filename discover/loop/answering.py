@@ -187,10 +187,7 @@ def _failed(result: Any) -> str:
 
 
 def _alternative(result: Any) -> str:
-    """Return which explanation is the next likeliest; empty where the law is settled.
-
-    Or which describes the same, to the last digit.
-    """
+    """Return what describes the same, or is the next likeliest; empty where the law is settled."""
     if twin := result.remaining.get("oil_twin"):
         thick, rises = significant(twin["viscosity"], 3), significant(twin["rise_time"], 2)
         tool = f" and a tool of {significant(twin['inertia'], 2)} Pa s²" * bool(twin["inertia"])

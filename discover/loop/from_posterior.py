@@ -285,26 +285,19 @@ class Ended(Path):
         return text
 
     def _oil_twin(self) -> dict[str, float] | None:
-        """Return the oil behind a slow motor that records the same; None where none does.
-
-        Nor where the relaxation time is known, or a motor or another effect on the rate is.
-        """
-        model, declared = self.posterior.problem.model, self.posterior.problem.declared
-        names = [*self.fit.names, *(known.name for known in declared.effects)]
-        others = [one for one in model.effects if one.name in names]
-        others = [one for one in others if one.name != "solvent_viscosity"]
-        fluid = final_model.augmented_fluid(model, self.theta, names)
-        if (
-            self.verdict not in EXPLAINED
-            or 1 not in declared.free_positions
-            or fluid.n_modes > 1
-            or not isinstance(declared.law, UpperConvectedMaxwell)
-            or any(one.kind != "signal" or one.name == "instrument_inertia" for one in others)
-        ):
+        """Return the oil behind a slow motor that records the same; None where none does."""
+        problem, declared = self.posterior.problem, self.posterior.problem.declared
+        names = {*self.fit.names, *(known.name for known in declared.effects)}
+        # neither a motor nor an inertia that is there already, nor what is fed back to the rate
+        others = (one for one in problem.model.effects if one.name in names - {"solvent_viscosity"})
+        alone = all(one.kind == "signal" and one.name != "instrument_inertia" for one in others)
+        known = 1 not in declared.free_positions or self.verdict not in EXPLAINED
+        fluid = final_model.augmented_fluid(problem.model, self.theta, [*names])
+        maxwell = isinstance(declared.law, UpperConvectedMaxwell) and fluid.n_modes == 1
+        if known or not (alone and maxwell):
             return None
         mode = float(fluid.modulus[0]), float(fluid.relaxation_time[0])
-        twin = oil_twin(*mode, float(fluid.solvent_viscosity), self.posterior.problem.fitted.runs)
-        return None if twin is None else twin._asdict()
+        return oil_twin(*mode, float(fluid.solvent_viscosity), problem.fitted.runs)
 
     def _bench(self) -> dict[str, float]:
         """Return by how much a sound bench is off here, as fitted jointly: its nuisances."""

@@ -96,7 +96,7 @@ def close_loop(
         options["effects"] = effects if named else [getattr(e, "name", e) for e in effects]
     divided = in_memory.data_in_memory(data, held_out)
     declared = in_memory.with_known(
-        in_memory.declared_fluid(base, data), known_effects, free, by_mode
+        in_memory.declared_fluid(base, divided.dataset), known_effects, free, by_mode
     )
     asked = {"loop": options, "verdict": {"tolerance": tolerance}}
     study = in_memory.study_in_memory(data, asked, "close_loop()")

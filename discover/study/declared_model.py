@@ -89,12 +89,9 @@ class StudyModel:
 
 
 def declared_model(study: Study, dataset: Dataset) -> StudyModel:
-    """Return the declared law of a study, with its modes; InputError if something is wrong.
-
-    What is not declared is of data that are computed 1, as they are; of others it is the sweep's,
-    and without one fitted.
-    """
+    """Return the declared law of a study, with its modes; InputError if something is wrong."""
     model, is_computed = study.model, study.data.synthetic is not None
+    # what nobody declares is one of computed data, and of others the sweep's or fitted
     given = [getattr(model, key) for key in MODE_CONSTANTS]
     undeclared = given == [None, None] and model.elastic_modulus_Pa is None
     if undeclared and not is_computed and dataset.linear_sweep is not None:

@@ -35,11 +35,17 @@ _FEWEST_RATIOS, _STEADY_RATIO, _FEWEST_GAINS = 5, 0.05, 3
 _CLEAR_OF_ZERO = 0.3  # where the stress passes through zero its ratio says nothing
 # Of gains that differ: what a law that thins leaves of linear theory at small strain, and chance
 _STILL_LINEAR, _UNLIKELY = 0.01, 1e-3
-# Units that are taken for those of the columns, over these; one may be the other way round as well
-_MISTAKEN = {
-    "stress": ("Pa", {"kPa": 1e3, "MPa": 1e6, "dyn/cm2": 0.1}),
-    "shear rate": ("1/s", {"1/min": 1.0 / 60.0, "%/s": 0.01}),
-    "time": ("s", {"ms": 1e-3, "min": 60.0, "h": 3600.0}),
+# Units that are taken for others, and what then makes the numbers right
+_MISTAKEN: dict[str, dict[str, float]] = {
+    "a stress in kPa that is read in Pa": {"stress": 1e3},
+    "a stress in MPa that is read in Pa": {"stress": 1e6},
+    "a stress in Pa that is read in kPa": {"stress": 1e-3},
+    "a stress in dyn/cm2 that is read in Pa": {"stress": 0.1},
+    "a shear rate in 1/min that is read in 1/s": {"rate": 1.0 / 60.0},
+    "a shear rate in %/s that is read in 1/s": {"rate": 0.01},
+    "a time in ms that is read in s": {"time": 1e-3},
+    "a time in min that is read in s": {"time": 60.0},
+    "a time in h that is read in s": {"time": 3600.0},
 }
 # Share of the small strains that then agree with the sweep, which as they stand do not, and by how
 # much the stress changes among them: a level alone may agree by chance. Damping functions are 0.9
@@ -181,11 +187,7 @@ def against_linear_theory(
 def _mistaken_units(
     runs: Sequence[Run], sweep: LinearSweep, spectrum: RelaxationSpectrum
 ) -> list[str]:
-    """Return which units in place of those read make the runs agree with the linear sweep.
-
-    None where they agree as they are, or with none. All runs together: of a wrong rate or time
-    hardly a sample lies at small strain as it is read.
-    """
+    """Return which units in place of those read make all runs together agree with the sweep."""
 
     def agreement(**factors: float) -> float:
         parts = [_linear_part(run, sweep, spectrum, _UNIT_STRAIN, **factors) for run in runs]
@@ -196,13 +198,7 @@ def _mistaken_units(
 
     if not runs or agreement() > 1.0 - _AGREE:
         return []
-    told = []
-    for what, (unit, others) in _MISTAKEN.items():
-        for other, factor in others.items():
-            for held, read, value in ((other, unit, factor), (unit, other, 1.0 / factor)):
-                if agreement(**{what.split()[-1]: value}) >= _AGREE:
-                    told.append(f"a {what} in {held} that is read in {read}")
-    return told
+    return [unit for unit, factors in _MISTAKEN.items() if agreement(**factors) >= _AGREE]
 
 
 def _of_start_up(
@@ -242,18 +238,10 @@ def _linear_stress(
 
 
 def _linear_part(
-    run: Run,
-    sweep: LinearSweep,
-    spectrum: RelaxationSpectrum,
-    limit: float = _LINEAR_STRAIN,
-    stress: float = 1.0,
-    rate: float = 1.0,
-    time: float = 1.0,
-) -> tuple[Values, Values]:
-    """Stresses and those of linear theory until the strain first exceeds a limit.
-
-    `stress`, `rate`, `time`: factors on what was recorded.
-    """
+    run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum, limit: float = _LINEAR_STRAIN,
+    stress: float = 1.0, rate: float = 1.0, time: float = 1.0,
+) -> tuple[Values, Values]:  # fmt: skip
+    """Stresses, times a factor, and those of linear theory until the strain exceeds a limit."""
     rates, times = rate * np.append(run.rate[0], run.rate), time * np.append(0.0, run.time)
     strain = np.abs(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
     n = int(np.argmax(np.append(strain, np.inf) >= limit))
