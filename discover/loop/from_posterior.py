@@ -244,7 +244,7 @@ class Ended(Path):
             "autocorrelation": fit.noise.correlation,
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
-            "oil_twin": self._oil_twin(),
+            "oil_twin": self.oil_twin,
             "bench": self._bench(),
             "description": said + self._in_words(),
             "step_instants": {}
@@ -284,7 +284,8 @@ class Ended(Path):
             text = f"An effect is still missing or has another form. {text}"
         return text
 
-    def _oil_twin(self) -> dict[str, float] | None:
+    @cached_property
+    def oil_twin(self) -> dict[str, float] | None:
         """Return the oil behind a slow motor that records the same; None where none does."""
         problem, declared = self.posterior.problem, self.posterior.problem.declared
         names = {*self.fit.names, *(known.name for known in declared.effects)}
@@ -355,6 +356,9 @@ def result_of(
     if not ended.without_fluid:
         with np.errstate(invalid="ignore"):  # laws that diverge in a test
             tests = design(ended.posterior)
+    spread = {} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit)
+    if ended.oil_twin and "N1" in spread:  # of which an oil has none
+        spread["N1"] = replace(spread["N1"], inside=1.0, beyond=1.0)
     return LoopResult(
         verdict=ended.verdict,
         error_before=errors_of(ended.records, 0),
@@ -372,7 +376,7 @@ def result_of(
         laws=laws,
         free_form=tuple(ended.curves),
         discrepancy=ended.discrepancy,
-        spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
+        spread_of_laws=spread,
         left_out=ended.left_out,
         nearest_law=ended.posterior.memory.get("named"),
         fluid=None if whole else fluid,

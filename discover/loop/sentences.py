@@ -72,8 +72,7 @@ def what_to_measure_next(result: Any) -> str:
     if untested == "states":
         return A_TRANSIENT
     if result.remaining.get("oil_twin"):
-        check = _as_clause(make_effect("rate_rise_time").check)
-        return f"To distinguish the fluid from an oil behind a slow motor, {check}, or measure N1."
+        return f"Measure N1, or {_as_clause(make_effect('rate_rise_time').check)}."
     if told := _telling_test(result):
         return told
     if told := _of_sweep(result):

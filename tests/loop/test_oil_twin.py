@@ -43,6 +43,8 @@ def test_an_oil_behind_a_slow_motor_is_told_beside_the_mode_that_records_the_sam
     assert twin["inertia"] == 0.0
     assert "An oil of 10" in commanded.answer.alternative
     assert "motor's angle" in commanded.answer.next_test
+    # nor is a normal stress claimed, of which an oil has none
+    assert "no nonlinear law determined" in commanded.answer.title
 
 
 def test_no_such_oil_is_told_where_the_rate_was_measured_at_the_tool():
@@ -77,4 +79,5 @@ def test_an_inertia_behind_the_motor_is_a_solvent_beside_the_mode():
     from discover.identify.oil_twin import oil_twin
 
     found = oil_twin((viscosity - solvent) / rise, rise, solvent, [next(_runs_of_a_mode())])
-    assert found == pytest.approx((viscosity, rise, inertia), rel=1e-12)
+    exact = {"viscosity": viscosity, "rise_time": rise, "inertia": inertia}
+    assert found == {name: pytest.approx(value, rel=1e-12) for name, value in exact.items()}
