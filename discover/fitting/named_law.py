@@ -27,12 +27,7 @@ from discover.loop.from_posterior import Ended
 from discover.loop.loop import without_fluid
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
-from discover.study.declared_model import (
-    MODE_CONSTANTS,
-    StudyModel,
-    forward_model,
-    linear_start,
-)
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model, linear_start
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Verdict
 from discover.summary_view import Estimate

@@ -9,15 +9,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.answer import (
-    QUANTITIES,
-    TOLERANCE,
-    Answer,
-    Constant,
-    Discrepancy,
-    HasAnswer,
-    Mode,
-)
+from discover.answer import QUANTITIES, TOLERANCE, Answer, Constant, Discrepancy, HasAnswer, Mode
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
@@ -104,10 +96,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         return pd.DataFrame(matrix, index=index, columns=index)
 
     def predict(self, data: Dataset) -> Float[np.ndarray, " rows"]:
-        """Return what the fitted law records at the samples of all runs, one after the other.
-
-        As estimators do: stress in Pa, or of creep the strain.
-        """
+        """Return stress in Pa, of creep the strain, at the samples of all runs in their order."""
         if not isinstance(data, Dataset):
             raise InputError(
                 f"predict needs a data set; got a {type(data).__name__}. Load one with "

@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.answer import (
-    Answer,
-    Constant,
-    Mode,
-    Suspect,
-)
+from discover.answer import Answer, Constant, Mode, Suspect
 from discover.answer import modes_in_words as modes
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import ByMode, named_law
@@ -29,14 +24,7 @@ from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParamete
 from discover.loop.runs import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.statistics.residual import fast_part
-from discover.words import (
-    effect_title,
-    effects_title,
-    listed,
-    percent_of,
-    readable,
-    significant,
-)
+from discover.words import effect_title, effects_title, listed, percent_of, readable, significant
 
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
 _SETTLED = 0.95  # Probability from which on nothing is said of other laws

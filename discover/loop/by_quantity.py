@@ -162,10 +162,7 @@ _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
 
 
 def normal_stress_settled(result: Any) -> bool:
-    """Return whether laws that describe the runs as well have one N1: more than linear response.
-
-    Nor does a law that misses the runs, which is the only one maybe, say what N1 is.
-    """
+    """Return whether a law describes more than linear response, and equally good ones its N1."""
     apart = differing(result, "N1")
     only_linear = all(record.control == "oscillation" for record in result.records)
     settled = apart is not None and max(apart, missed_size(result)) < _APART

@@ -40,8 +40,8 @@ def close_loop(
     data
         The runs to fit.
     base
-        The declared fluid; by default that of the data's linear sweep, and without one one mode
-        of Maxwell, which is fitted.
+        The declared fluid; by default that of the data's linear sweep, and without a sweep one
+        mode of Maxwell, which is fitted.
     held_out
         Runs that only test: a data set of their own, names of runs of `data`, or ``"each"`` to
         hold each run out in turn.

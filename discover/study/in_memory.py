@@ -16,12 +16,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, make_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study
-from discover.study.declared_model import (
-    MODE_CONSTANTS,
-    StudyModel,
-    linear_start,
-    spectra_of,
-)
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, linear_start, spectra_of
 from discover.study.schema import Study
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]

@@ -39,7 +39,6 @@ _STILL_LINEAR, _UNLIKELY = 0.01, 1e-3
 _MISTAKEN: dict[str, dict[str, float]] = {
     "a stress in kPa that is read in Pa": {"stress": 1e3},
     "a stress in MPa that is read in Pa": {"stress": 1e6},
-    "a stress in Pa that is read in kPa": {"stress": 1e-3},
     "a stress in dyn/cm2 that is read in Pa": {"stress": 0.1},
     "a shear rate in 1/min that is read in 1/s": {"rate": 1.0 / 60.0},
     "a shear rate in %/s that is read in 1/s": {"rate": 0.01},

@@ -241,9 +241,8 @@ class NoiseModel:
         """Return columns of the rows that are kept, over independent noise of variance one."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
         scaled = values[self.kept] / deviation[:, None]
-        decay = self._decay(noise.correlation, noise.by_sample)[
-            :, None
-        ]  # zero at the first of a run
+        # zero at the first of a run
+        decay = self._decay(noise.correlation, noise.by_sample)[:, None]
         scaled[1:] -= decay[1:] * scaled[:-1]
         scaled /= np.sqrt(1.0 - decay**2)
         return scaled
