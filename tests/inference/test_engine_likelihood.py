@@ -75,28 +75,6 @@ def test_whitening_is_the_density_of_correlated_noise(rows, correlation, share):
     assert found - constant == pytest.approx(exact, rel=1e-9)  # rounding of a determinant
 
 
-@pytest.mark.parametrize("by_sample", [True, False])
-def test_on_uneven_times_the_clock_of_slow_noise_is_told_from_its_residual(by_sample):
-    # neighbours that agree however far apart in time, or those of an even grid that were kept
-    lot, runs, residuals = np.random.default_rng(5), [], []
-    at = np.unique(np.rint(np.geomspace(1.0, 4000.0, 400)).astype(int))
-    for number in range(2):
-        slow = autoregressive(0.75, at[-1] + 1, lot)
-        residuals.append(slow[: len(at)] if by_sample else slow[at])
-        stress, flow = np.ones(len(at)), np.ones(len(at))
-        runs.append(dc.Run(f"{number}.csv", 1e-3 * at, start_up(1.0), flow, stress))
-    rows = Rows.of(runs)
-    residual, model = 0.01 * np.concatenate(residuals), NoiseModel(rows)
-    _, noise = model.log_likelihood(residual, rows.recorded)
-    assert noise.by_sample is by_sample
-    # by time gaps are of a typical spacing, which is several of the even grid
-    assert noise.correlation == 0.75 if by_sample else noise.correlation < 0.75
-    # the whitened residual is independent: neighbours of 530 correlate by less than four times
-    # 1/√530 by chance
-    white = model.whitened(residual[:, None], rows.recorded, noise)[:, 0]
-    assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 4.0 / np.sqrt(len(white))
-
-
 @pytest.mark.parametrize(("correlation", "about"), [(0.0, 0.0), (0.6, 0.6)])
 def test_the_correlation_of_noise_is_told_from_its_residual(correlation, about):
     lot = np.random.default_rng(2)

@@ -13,7 +13,7 @@ O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4, 415, fo
 τ, the stiffness of S and the growth are summed over a grid.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -203,8 +203,7 @@ class Discrepancy:
 
     def _noise(self, correlation: float) -> Noise:
         """Return noise of size one with a correlation."""
-        sizes = self.sizes_of_noise
-        return replace(self.fit.noise, sizes=sizes, common=1.0, correlation=correlation)
+        return Noise(self.sizes_of_noise, 1.0, correlation, self.fit.noise.share)
 
     def _products(self, correlation: float) -> "_Products":
         """Return products of what was left, columns and curves of each run, whitened."""

@@ -1,14 +1,13 @@
 """Noise of records: a size for each run, correlated in time, in proportion to the stress or not.
 
-The residual of a sample over its standard deviation is an AR(1) sequence in each run: in time, or
-from sample to sample however far apart, as of what the instrument averages for each. The size of
+The residual of a sample over its standard deviation is an AR(1) sequence in each run. The size of
 run r is s_r = a · rms, with 1/s_r² gamma distributed about one a of all runs, so that runs share
 what they can and a loud one speaks softly; it is integrated out   [Gelman et al. 2013, Bayesian
 Data Analysis, ch. 5 and 14]. The correlation and the share of noise in proportion to the stress are
 summed over a grid.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -41,8 +40,7 @@ _BLOCK = 16
 
 _SHARES = np.array(SHARES)
 
-_UNEVEN = 0.1
-"""Share of wide gaps between samples from which on time and samples are two clocks."""
+_GRID = tuple(product(range(len(SHARES)), range(len(CORRELATIONS))))
 
 
 def _prior(count: int) -> np.ndarray:
@@ -50,18 +48,17 @@ def _prior(count: int) -> np.ndarray:
     return np.log(np.where(np.arange(count) == 0, 0.5, 0.5 / (count - 1)))
 
 
+_PRIORS = (_prior(len(SHARES))[:, None] + _prior(len(CORRELATIONS))).ravel()
+
+
 @dataclass(frozen=True)
 class Noise:
-    """One noise: sizes of runs over their records, correlation, share in proportion.
-
-    `by_sample`: whether the correlation is that of neighbours, however far apart in time.
-    """
+    """One noise: sizes of runs over their records, correlation, share in proportion."""
 
     sizes: Float[np.ndarray, " runs"]
     common: float
     correlation: float
     share: float
-    by_sample: bool = False
 
 
 class NoiseModel:
@@ -92,23 +89,17 @@ class NoiseModel:
         new = np.append(True, (np.diff(run) != 0) | (np.diff(gap) != 0)) if len(run) else []
         self._groups = np.flatnonzero(new)
         self._group_starts = np.searchsorted(run[self._groups], self._there)
-        uneven = np.mean(self._gap > 1) > _UNEVEN if len(run) else False
-        clocks = [(c, False) for c in CORRELATIONS]
-        clocks += [(c, True) for c in CORRELATIONS[1:]] if uneven else []
-        self._grid = tuple(product(SHARES, clocks))
-        self._priors = (_prior(len(SHARES))[:, None] + _prior(len(clocks))).ravel()
-        decay = np.array([self._decay(*one) for one in clocks])
+        decay = np.array([self._decay(c) for c in CORRELATIONS])
         self._determinants = -0.5 * np.sum(np.log(1.0 - decay**2), axis=1)
         self._decays = decay[:, order[self._groups]]
 
-    def _decay(self, correlation: float, by_sample: bool) -> Float[np.ndarray, " rows"]:
-        gap = 1 if by_sample else np.maximum(self._gap, 1)
-        return np.where(self._gap > 0, correlation**gap, 0.0)
+    def _decay(self, correlation: float) -> Float[np.ndarray, " rows"]:
+        return np.where(self._gap > 0, correlation ** np.maximum(self._gap, 1), 0.0)
 
     def log_determinant(self, predicted: Float[np.ndarray, " rows"], noise: "Noise") -> float:
         """Return the log determinant of what `whitened` multiplies by."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
-        decay = self._decay(noise.correlation, noise.by_sample)
+        decay = self._decay(noise.correlation)
         return float(-0.5 * np.sum(np.log(1.0 - decay**2)) - np.sum(np.log(deviation)))
 
     def deviation(self, predicted: Float[np.ndarray, " rows"], share: float):
@@ -155,25 +146,23 @@ class NoiseModel:
         sums = [np.add.reduceat(part, self._groups, axis=-1)[..., None, :] for part in parts]
         decay = self._decays
         left = (sums[0] + decay**2 * sums[1] - 2.0 * decay * sums[2]) / (1.0 - decay**2)
-        square = np.zeros((len(usable), len(SHARES), len(decay), runs))
+        square = np.zeros((len(usable), len(SHARES), len(CORRELATIONS), runs))
         square[..., self._there] = np.add.reduceat(left, self._group_starts, axis=-1)
-        square = square.reshape(len(usable), len(self._grid), runs)
+        square = square.reshape(len(usable), len(_GRID), runs)
         # a logarithm of many together: none leaves the range of numbers
         together = np.multiply.reduceat(variance, self._blocks, axis=-1)
         spreads = self._log_size + 0.5 * np.sum(np.log(together), axis=-1)
         densities, common = self._marginal(square)
-        densities += (self._determinants - spreads[..., None]).reshape(len(usable), -1)
-        densities += self._priors
+        densities += (self._determinants - spreads[..., None]).reshape(len(usable), -1) + _PRIORS
         values[usable] = np.logaddexp.reduce(densities, axis=1)
         for one, at, best in zip(usable, range(len(usable)), np.argmax(densities, 1), strict=True):
-            share, (correlation, by_sample) = self._grid[best]
+            share, correlation = _GRID[best]
             size, known = common[at, best], self._alike + self._count
             noises[one] = Noise(
                 np.sqrt((self._alike * size + square[at, best]) / known),
                 float(np.sqrt(size)),
-                correlation,
-                share,
-                by_sample,
+                CORRELATIONS[correlation],
+                SHARES[share],
             )
         return values, noises
 
@@ -196,7 +185,7 @@ class NoiseModel:
         own = (LEAST * self.rows.size[self.kept] / deviation) ** 2
 
         def of(correlation: float):
-            decay = self._decay(correlation, noise.by_sample)
+            decay = self._decay(correlation)
             left = (scaled - decay * scaled[self._before]) ** 2 + own + decay**2 * own[self._before]
             square = np.zeros(len(self._count))
             square[self._there] = np.add.reduceat(left / (1.0 - decay**2), self._starts)
@@ -210,7 +199,7 @@ class NoiseModel:
         correlation = float(found.x)
         _, common, square = of(correlation)
         sizes = np.sqrt((self._alike * common + square) / (self._alike + self._count))
-        return replace(noise, sizes=sizes, common=float(np.sqrt(common)), correlation=correlation)
+        return Noise(sizes, float(np.sqrt(common)), correlation, noise.share)
 
     def _marginal(self, square: Float[np.ndarray, "*grid runs"]):
         """Return the log density with sizes of runs integrated out, and the likeliest a²."""
@@ -229,7 +218,7 @@ class NoiseModel:
         """Return the sum of squares that `whitened` makes of the independent noise `LEAST`."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
         own = (LEAST * self.rows.size[self.kept] / deviation) ** 2
-        decay = self._decay(noise.correlation, noise.by_sample) ** 2
+        decay = self._decay(noise.correlation) ** 2
         return float(np.sum((own + decay * own[self._before]) / (1.0 - decay)))
 
     def whitened(
@@ -241,8 +230,7 @@ class NoiseModel:
         """Return columns of the rows that are kept, over independent noise of variance one."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
         scaled = values[self.kept] / deviation[:, None]
-        # zero at the first of a run
-        decay = self._decay(noise.correlation, noise.by_sample)[:, None]
+        decay = self._decay(noise.correlation)[:, None]  # zero at the first of a run
         scaled[1:] -= decay[1:] * scaled[:-1]
         scaled /= np.sqrt(1.0 - decay**2)
         return scaled
