@@ -312,6 +312,11 @@ def test_a_range_of_rates_is_where_runs_stay():
     assert range_of([*FITTED, down, replace(FITTED[0], control="stress")]).tests == (
         "steps of rate", "start-up", "creep",
     )  # fmt: skip
+    backwards = replace(wave, rate=-wave.rate)
+    assert range_of([backwards]) == range_of([wave])  # a start-up in the other direction
+    reversed_once = replace(wave, rate=np.array([1.0, 1.0, 1.0, -1.0, -1.0]))
+    assert range_of([reversed_once]).tests == ("steps of rate",)
+    assert not range_of([reversed_once]).oscillates
     turns = replace(wave, rate=np.array([2.0, 0.1, -2.0, 0.1, 2.0]))
     assert not range_of([turns]).tests
     assert range_of([turns]).rate_1_s == pytest.approx((2.0, 2.0))  # its amplitude
