@@ -66,11 +66,12 @@ def problems_in(message: str) -> list[str]:
     return others or [first]
 
 
-_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+_FULL = "; make room and run again, what was finished is kept"
+_REMEDIES = dict.fromkeys((errno.ENOSPC, errno.EFBIG, errno.EDQUOT), _FULL)
+_REMEDIES[errno.ENAMETOOLONG] = "; give a shorter name"
 
 
 def plain_os_error(error: OSError) -> str:
-    """Return in words what the operating system refused, where, and how to mend a full disk."""
+    """Return in words what the operating system refused, where, and how to mend it."""
     place = f" ({error.filename})" if error.filename else ""
-    full = "; make room and run again, what was finished is kept"
-    return f"{error.strerror or error}{place}{full if error.errno in _FULL else ''}"
+    return f"{error.strerror or error}{place}{_REMEDIES.get(error.errno or 0, '')}"

@@ -1,5 +1,6 @@
 """What a terminal shows: lines that it cannot obey, and progress with the time left."""
 
+import errno
 import functools
 import io
 import os
@@ -220,7 +221,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
             if isinstance(error, OSError):
-                _fail(plain_os_error(error), 1)
+                # a name that no file can have is the user's
+                _fail(plain_os_error(error), 2 if error.errno == errno.ENAMETOOLONG else 1)
             said = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
             remedy = f"set {DEBUG_VARIABLE}=1 for the traceback"
             _fail(f"{said} (not your input's fault; {remedy})", 1)

@@ -67,7 +67,7 @@ def compare(
         Fitted estimators, one of each learner at most, or a data set.
     second
         The data set that tests estimators; for a data set the known `Fluid`, by default that of its
-        linear sweep, and without one upper-convected Maxwell with G = 1 Pa and λ = 1 s.
+        linear sweep, and without one a mode of Maxwell, which is fitted.
     train
         What estimators from a file were fitted to; the file holds no data.
     held_out
@@ -106,7 +106,7 @@ def compare(
         if train is not None:
             raise InputError("train is for estimators from a file; leave it out.")
         data = data_in_memory(first, held_out)
-        model = with_known(declared_fluid(second, first), known_effects, free)
+        model = with_known(declared_fluid(second, data.dataset), known_effects, free)
         study = _study(data, model, options, tolerance)
         return compare_study(study, seed, say, data=data, declared=model)
     judging = not isinstance(held_out, Sized) or len(held_out) > 0

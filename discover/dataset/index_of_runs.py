@@ -12,6 +12,7 @@ from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, is_inside, is_number, read_table, shown
 from discover.errors import InputError, Problems
+from discover.plain_numbers import short
 from discover.words import did_you_mean
 
 
@@ -73,7 +74,7 @@ def _cells(index: Table, key: str, column: str) -> Sequence[str]:
     """Return a column of ``runs.csv`` that a key names, as text; InputError if it is missing."""
     if column not in index.columns:
         raise InputError(
-            f"{key} names the column {column!r}, but {INDEX_FILE} has only {index.listed}."
+            f"{key} names the column {short(column)}, but {INDEX_FILE} has only {index.listed}."
             f"{did_you_mean(column, index.columns)} Correct the name, or leave {key} out."
         )
     return index.columns[column]

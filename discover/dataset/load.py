@@ -290,14 +290,16 @@ def from_dataframe(
     if unknown := [kind for kind in tables if kind not in _KINDS]:
         raise InputError(unknown_name("table", unknown[0], _KINDS))
     by_run = _by_run(samples, name)
+    # half a character, which no file can hold, is spelled out
+    as_text: dict[str, Any] = {"index": False, "errors": "backslashreplace"}
     with TemporaryDirectory() as folder:
         for run, table in by_run.items():
-            table.to_csv(Path(folder) / run, index=False)
+            table.to_csv(Path(folder) / run, **as_text)
         index = pd.DataFrame({"file": list(by_run)}) if runs is None else _index(runs, by_run)
         if len(index):
-            index.to_csv(Path(folder) / INDEX_FILE, index=False)
+            index.to_csv(Path(folder) / INDEX_FILE, **as_text)
         for kind, table in tables.items():
-            table.to_csv(Path(folder) / f"{kind}.csv", index=False)
+            table.to_csv(Path(folder) / f"{kind}.csv", **as_text)
         if not any(Path(folder).iterdir()):
             raise InputError("There is no sample and no table; give one with samples at least.")
         return _read_folder(Path(folder), name, **options)

@@ -75,7 +75,9 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
     laws = {} if answer is None else {ANSWER: equation_from_json(answer, f"{where}: answer_law")}
     if isinstance(content.get("law"), str):  # the name of the law that was fitted
         if not laws:
-            raise InputError(f"{where}: {content['law'][:80]} has no written form.")
+            raise InputError(
+                f"{where}: {content['law'][:80]} has no written form. Choose another law."
+            )
         return laws
     if "law" in content or "law_missing" in content:
         near = content.get("nearest_law")

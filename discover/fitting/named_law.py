@@ -27,27 +27,28 @@ from discover.loop.from_posterior import Ended
 from discover.loop.loop import without_fluid
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
-from discover.study.declared_model import (
-    MODE_CONSTANTS,
-    StudyModel,
-    forward_model,
-    linear_start,
-)
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model, linear_start
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Verdict
 from discover.summary_view import Estimate
 from discover.validation import validated
 from discover.words import did_you_mean, unknown_name
 
-_STARTS = 8
-"""Starts of a fit, spread evenly over the ranges   [Sobol 1967]; the best end counts."""
+_TRIED, _STARTS = 64, 6
+"""A fit starts at the likeliest of some vectors spread evenly over the ranges   [Sobol 1967]; the
+best end counts."""
 
-_DECADES = 1.5
+_REACHES = 1.0, 0.2
+"""Parts of the ranges over which they are spread, first whole and then about the best end: a law
+with a yield stress has walls, where some run begins to flow, that no slope leads through."""
+
+_DECADES = 2.5
 """To either side of the estimate, over which starts of a modulus or a time are spread."""
 
 _AT_END = 1e-6  # share of its range within which a constant lies at an end of it
 
 Bounds = Mapping[str, tuple[float, float]]
+Theta = Float[np.ndarray, " p"]
 
 
 @in_one_thread
@@ -131,12 +132,17 @@ def fit(
     problem.narrow(ranges)
     fitter = Fitter(problem, problem.fitted)
     search = Search(fitter)
-    starts = _starts(model, names, model.free_positions, start, declared)
-    search.add(fitter.start((), theta) for theta in starts)
-    best = search.found[frozenset()]
+    first = _first(model, names, start, declared)
+    (best,) = search.add([fitter.start((), first)])
+    for reach in _REACHES if model.free_positions else ():
+        spread = _spread(model, model.free_positions, first, best.theta, reach)
+        tried = fitter.fit([fitter.start((), one) for one in spread], 0, derivatives=False)
+        tried.sort(key=lambda one: -one.log_posterior)
+        search.add(tried[:_STARTS])
+        best = search.found[frozenset()]
     if not np.isfinite(best.log_evidence):
         raise InputError(
-            f"{LAWS[law].title} cannot be integrated through these runs with any of {_STARTS} "
+            f"{LAWS[law].title} cannot be integrated through these runs with any of {_TRIED} "
             "starts. Narrow the ranges with bounds, or give a start."
         )
     posterior = posterior_of(search)
@@ -255,14 +261,13 @@ def _size(declared: StudyModel, position: int) -> float:
     return float(values[0]) if len(values) == 1 else 1.0
 
 
-def _starts(
+def _first(
     model: AugmentedModel,
     names: Mapping[int, str],
-    free: Sequence[int],
     start: Mapping[str, float],
     declared: StudyModel,
-) -> list[Float[np.ndarray, " p"]]:
-    """Return where the fit starts: as declared, and spread over the ranges."""
+) -> Theta:
+    """Return the first start of the fit: as declared."""
     first = np.clip(model.zero(), model.low, model.high)
     for position, name in names.items():
         if name in start:
@@ -272,25 +277,30 @@ def _starts(
             if not model.low[position] <= value <= model.high[position]:
                 raise InputError(f"start[{name!r}] = {start[name]:g} lies outside its range.")
             first[position] = value
-    if not free:
-        return [first]
-    starts = [first]
-    for point in qmc.Sobol(len(free), scramble=False).random(_STARTS)[1:]:
-        theta = first.copy()
-        for share, position in zip(point, free, strict=True):
-            low, high = float(model.low[position]), float(model.high[position])
-            if position < 2:
-                reach = _DECADES * np.log(10.0)
-                low, high = max(low, first[position] - reach), min(high, first[position] + reach)
-            elif low >= 0.0:
-                # amplitudes are small where laws are mild: even in the logarithm
-                top = min(high, 1e3 * max(float(model.first_trial[position]), low))
-                low, high = np.log(max(low, 1e-3 * top)), np.log(top)
-                theta[position] = np.exp(low + share * (high - low))
-                continue
-            theta[position] = low + share * (high - low)
-        starts.append(np.clip(theta, model.low, model.high))
-    return starts
+    return first
+
+
+def _spread(
+    model: AugmentedModel, free: Sequence[int], first: Theta, centre: Theta, reach: float
+) -> list[Theta]:
+    """Return vectors spread over a part of the ranges: all of them, or about a centre."""
+    spread = np.tile(first, (_TRIED, 1))
+    shares = qmc.Sobol(len(free), scramble=False).random(_TRIED).T - 0.5
+    for share, position in zip(shares, free, strict=True):
+        low, high = float(model.low[position]), float(model.high[position])
+        at, is_amplitude = float(centre[position]), position >= 2 and low >= 0.0
+        if position < 2:
+            half = _DECADES * np.log(10.0)
+            low, high = max(low, first[position] - half), min(high, first[position] + half)
+        elif is_amplitude:
+            # amplitudes are small where laws are mild: even in the logarithm
+            top = min(high, 1e3 * max(float(model.first_trial[position]), low))
+            low, high = np.log(max(low, 1e-3 * top)), np.log(top)
+            at = float(np.log(max(at, np.exp(low))))
+        at = 0.5 * (low + high) if reach == 1.0 else at
+        values = at + reach * (high - low) * share
+        spread[:, position] = np.exp(values) if is_amplitude else values
+    return list(np.clip(spread, model.low, model.high))
 
 
 def _constants(

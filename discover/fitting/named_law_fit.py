@@ -9,15 +9,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.answer import (
-    QUANTITIES,
-    TOLERANCE,
-    Answer,
-    Constant,
-    Discrepancy,
-    HasAnswer,
-    Mode,
-)
+from discover.answer import QUANTITIES, TOLERANCE, Answer, Constant, Discrepancy, HasAnswer, Mode
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
@@ -103,15 +95,17 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         index = self._index_of(self._estimates())
         return pd.DataFrame(matrix, index=index, columns=index)
 
-    def predict(self, data: Dataset) -> dict[str, Float[np.ndarray, " n"]]:
-        """Return what the fitted law records in each run: stress in Pa, or strain, by run."""
+    def predict(self, data: Dataset) -> Float[np.ndarray, " rows"]:
+        """Return stress in Pa, of creep the strain, at the samples of all runs in their order."""
         if not isinstance(data, Dataset):
             raise InputError(
                 f"predict needs a data set; got a {type(data).__name__}. Load one with "
                 "dc.load_dataset."
             )
         predicted = self.model.predict(self.theta, make_batch(data.runs))
-        return {run.name: row[: len(run)] for run, row in zip(data.runs, predicted, strict=True)}
+        return np.concatenate(
+            [row[: len(run)] for run, row in zip(data.runs, predicted, strict=True)]
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the relative error of each run, one line a run."""

@@ -32,6 +32,6 @@ def load(path: str | Path) -> TensorSINDy | TBNNUDE:
     if file.learner not in _LEARNERS:
         raise InputError(
             f"{path} holds an estimator of the kind {file.learner!r}; known are "
-            f"{', '.join(_LEARNERS)}."
+            f"{', '.join(_LEARNERS)}. Give a file that one of them saved."
         )
     return _LEARNERS[file.learner]._from_file(file)

@@ -30,7 +30,7 @@ from discover.loop.sentences import (
     what_to_measure_next,
 )
 from discover.statistics.residual import fast_part
-from discover.words import effect_title, effects_title, listed, percent_of, readable
+from discover.words import effect_title, effects_title, listed, percent_of, readable, significant
 
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
 _SETTLED = 0.95  # Probability from which on nothing is said of other laws
@@ -194,7 +194,11 @@ def _failed(result: Any) -> str:
 
 
 def _alternative(result: Any) -> str:
-    """Return which explanation is the next likeliest; empty where the law is settled."""
+    """Return what describes the same, or is the next likeliest; empty where the law is settled."""
+    if twin := result.remaining.get("oil_twin"):
+        thick, rises = significant(twin["viscosity"], 3), significant(twin["rise_time"], 2)
+        tool = f" and a tool of {significant(twin['inertia'], 2)} Pa s²" * bool(twin["inertia"])
+        return f"An oil of {thick} Pa s behind a motor with t_m = {rises} s{tool} records the same."
     told = result.explanations
     own = told.holding([stage.effect for stage in result.stages])
     if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:

@@ -74,7 +74,8 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
 
 
 def _turns(record: RunRecord) -> bool:
-    return record.is_transient and bool(np.min(record.rate) < -_TURNS * record.fastest)
+    ways = np.sign(record.rate[np.abs(record.rate) > _TURNS * record.fastest])
+    return record.is_transient and bool(np.count_nonzero(np.diff(ways)) > 1)  # one: a reversal
 
 
 def _test(record: RunRecord) -> str:
@@ -83,7 +84,7 @@ def _test(record: RunRecord) -> str:
         return ""
     if record.control == "stress":
         return "creep"
-    rates = np.abs(record.rate)
+    rates = record.rate * np.sign(record.rate[-1])
     return "start-up" if np.percentile(rates, 5.0) > _SAME * record.fastest else "steps of rate"
 
 

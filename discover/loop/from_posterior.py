@@ -14,10 +14,12 @@ from scipy.stats import chi2
 from discover.effects import AbstractEffect
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
+from discover.identify.oil_twin import oil_twin
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
+from discover.laws import UpperConvectedMaxwell
 from discover.loop import final_model
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.loop_result import LoopResult
@@ -33,6 +35,7 @@ from discover.loop.parts import (
 )
 from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
+from discover.loop.sentences import EXPLAINED
 from discover.statistics.residual import noise_beside
 from discover.words import percent_of
 
@@ -241,6 +244,7 @@ class Ended(Path):
             "autocorrelation": fit.noise.correlation,
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
+            "oil_twin": self.oil_twin,
             "bench": self._bench(),
             "description": said + self._in_words(),
             "step_instants": {}
@@ -279,6 +283,22 @@ class Ended(Path):
         if self.verdict == "unexplained":
             text = f"An effect is still missing or has another form. {text}"
         return text
+
+    @cached_property
+    def oil_twin(self) -> dict[str, float] | None:
+        """Return the oil behind a slow motor that records the same; None where none does."""
+        problem, declared = self.posterior.problem, self.posterior.problem.declared
+        names = {*self.fit.names, *(known.name for known in declared.effects)}
+        # neither a motor nor an inertia that is there already, nor what is fed back to the rate
+        others = (one for one in problem.model.effects if one.name in names - {"solvent_viscosity"})
+        alone = all(one.kind == "signal" and one.name != "instrument_inertia" for one in others)
+        known = 1 not in declared.free_positions or self.verdict not in EXPLAINED
+        fluid = final_model.augmented_fluid(problem.model, self.theta, [*names])
+        maxwell = isinstance(declared.law, UpperConvectedMaxwell) and fluid.n_modes == 1
+        if known or not (alone and maxwell):
+            return None
+        mode = float(fluid.modulus[0]), float(fluid.relaxation_time[0])
+        return oil_twin(*mode, float(fluid.solvent_viscosity), problem.fitted.runs)
 
     def _bench(self) -> dict[str, float]:
         """Return by how much a sound bench is off here, as fitted jointly: its nuisances."""
@@ -336,6 +356,9 @@ def result_of(
     if not ended.without_fluid:
         with np.errstate(invalid="ignore"):  # laws that diverge in a test
             tests = design(ended.posterior)
+    spread = {} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit)
+    if ended.oil_twin and "N1" in spread:  # of which an oil has none
+        spread["N1"] = replace(spread["N1"], inside=1.0, beyond=1.0)
     return LoopResult(
         verdict=ended.verdict,
         error_before=errors_of(ended.records, 0),
@@ -353,7 +376,7 @@ def result_of(
         laws=laws,
         free_form=tuple(ended.curves),
         discrepancy=ended.discrepancy,
-        spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
+        spread_of_laws=spread,
         left_out=ended.left_out,
         nearest_law=ended.posterior.memory.get("named"),
         fluid=None if whole else fluid,

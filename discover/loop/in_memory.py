@@ -40,8 +40,8 @@ def close_loop(
     data
         The runs to fit.
     base
-        The declared fluid; by default that of the data's linear sweep, and without one
-        upper-convected Maxwell with G = 1 Pa and λ = 1 s.
+        The declared fluid; by default that of the data's linear sweep, and without a sweep one
+        mode of Maxwell, which is fitted.
     held_out
         Runs that only test: a data set of their own, names of runs of `data`, or ``"each"`` to
         hold each run out in turn.
@@ -96,7 +96,7 @@ def close_loop(
         options["effects"] = effects if named else [getattr(e, "name", e) for e in effects]
     divided = in_memory.data_in_memory(data, held_out)
     declared = in_memory.with_known(
-        in_memory.declared_fluid(base, data), known_effects, free, by_mode
+        in_memory.declared_fluid(base, divided.dataset), known_effects, free, by_mode
     )
     asked = {"loop": options, "verdict": {"tolerance": tolerance}}
     study = in_memory.study_in_memory(data, asked, "close_loop()")

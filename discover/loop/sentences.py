@@ -6,6 +6,7 @@ from typing import Any
 from discover import words
 from discover.answer.modes_in_words import degrees, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ
+from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.runs import RunRecord
 
@@ -70,6 +71,8 @@ def what_to_measure_next(result: Any) -> str:
     untested = untested_by(result)
     if untested == "states":
         return A_TRANSIENT
+    if result.remaining.get("oil_twin"):
+        return f"Measure N1, or {_as_clause(make_effect('rate_rise_time').check)}."
     if told := _telling_test(result):
         return told
     if told := _of_sweep(result):

@@ -99,6 +99,6 @@ def check_of(material: SimpleMaterial) -> str:
 
 _BELOW = 0.9  # Stress of a creep over the yield stress, far enough from it to be told in an hour
 _CHECKS = {
-    "viscous": "N1, or a start-up: a constant viscosity alone does not show elasticity.",
+    "viscous": "N1, or the first moments of a start-up: a constant viscosity shows no elasticity.",
     "solid": "Creep or relaxation over a longer time: it shows whether the material flows.",
 }

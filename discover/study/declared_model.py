@@ -90,7 +90,14 @@ class StudyModel:
 
 def declared_model(study: Study, dataset: Dataset) -> StudyModel:
     """Return the declared law of a study, with its modes; InputError if something is wrong."""
-    model = study.model
+    model, is_computed = study.model, study.data.synthetic is not None
+    # what nobody declares is one of computed data, and of others the sweep's or fitted
+    given = [getattr(model, key) for key in MODE_CONSTANTS]
+    undeclared = given == [None, None] and model.elastic_modulus_Pa is None
+    if undeclared and not is_computed and dataset.linear_sweep is not None:
+        model = model.model_copy(update={"modes": model.modes or "lve"})
+    elif model.modes is None:
+        given = [one or (1.0 if is_computed else "fit") for one in given]
     effects = known_effects(model.effects, "[model] effects")
     if model.from_ is not None:
         earlier = read_earlier(model.from_, study.path)
@@ -119,7 +126,7 @@ def declared_model(study: Study, dataset: Dataset) -> StudyModel:
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
         solvent, solid = spectrum.solvent_viscosity, spectrum.solid
     else:
-        given, start = (model.modulus_Pa, model.relaxation_time_s), linear_start(dataset.runs)
+        start = linear_start(dataset.runs)
         modulus, relaxation_time = (
             np.atleast_1d(np.asarray(first if value == "fit" else value, dtype=float))
             for value, first in zip(given, start, strict=True)
@@ -141,7 +148,7 @@ def declared_model(study: Study, dataset: Dataset) -> StudyModel:
     if solid:
         warnings.warn(f"Declared model: {solid}", stacklevel=2)
     # beside a sweep: another loading, or an aged sample; one factor on all moduli, or on all times
-    free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
+    free += [key for key, value in zip(MODE_CONSTANTS, given, strict=True) if value == "fit"]
     modes = modulus, relaxation_time, tuple(free), spectrum, float(solvent or 0.0)
     also = {"by_mode": model.by_mode, "choice": model.choice, "solid": solid}
     return StudyModel(law, name, parameters, *modes, effects, **also)

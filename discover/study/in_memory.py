@@ -13,10 +13,15 @@ from discover.effects import known_effects
 from discover.errors import InputError
 from discover.laws.each_mode import differs_by_mode
 from discover.laws.multimode import Fluid
-from discover.laws.registry import check_law, name_of
+from discover.laws.registry import check_law, make_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study
-from discover.study.declared_model import MODE_CONSTANTS, StudyModel, spectrum_of_modes
+from discover.study.declared_model import (
+    MODE_CONSTANTS,
+    StudyModel,
+    linear_start,
+    spectrum_of_modes,
+)
 from discover.study.schema import Study
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
@@ -72,14 +77,14 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
 def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     """Return a `Fluid` as the declared model of a study.
 
-    None is that of the data's linear sweep, or without one Maxwell with G = 1 Pa and λ = 1 s.
+    None is that of the data's linear sweep and without a sweep one mode
+    of Maxwell, which is to be fitted.
     """
+    free = ()
     if base is None and data.linear_sweep is not None:
         base = Fluid.from_sweep(data.linear_sweep)
     elif base is None:
-        from discover.laws.textbook.classical import UpperConvectedMaxwell
-
-        base = Fluid.dimensionless(UpperConvectedMaxwell())
+        base, free = Fluid(make_law("ucm"), *linear_start(data.runs)), MODE_CONSTANTS
     if not isinstance(base, Fluid):
         raise InputError(
             f"base must be a Fluid; got a {type(base).__name__}. Make one with "
@@ -93,7 +98,7 @@ def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     modulus, times = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)
     spectrum = spectrum_of_modes(data.linear_sweep, solvent, times, modulus)
-    return StudyModel(base.law, name, parameters, modulus, times, (), spectrum, solvent)
+    return StudyModel(base.law, name, parameters, modulus, times, free, spectrum, solvent)
 
 
 def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
@@ -113,10 +118,10 @@ def with_known(
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
 ) -> StudyModel:
-    """Return a declared model with effects known beside it, and with what is to be fitted of it.
+    """Return a declared model with effects known beside it, and with what more of it is fitted.
 
-    `effects`: as ``[model] effects``. `by_mode`: which may differ from mode to mode. InputError
-    if an effect, a value or a constant is not as it should be.
+    `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
+    InputError if an effect, a value or a constant is not as it should be.
     """
     for option, names in (("free", free), ("by_mode", by_mode)):
         if isinstance(names, str):
@@ -129,4 +134,5 @@ def with_known(
             "name has no constant that could; register it with register_law."
         )
     known = known_effects({} if effects is None else effects, "known_effects")
-    return replace(declared, effects=known, free=tuple(dict.fromkeys(free)), by_mode=tuple(by_mode))
+    free = tuple(dict.fromkeys((*declared.free, *free)))
+    return replace(declared, effects=known, free=free, by_mode=tuple(by_mode))

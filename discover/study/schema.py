@@ -215,10 +215,11 @@ class Model(Section):
 
     law: LawNames = "ucm"
     """Known part: the name of a law, `"learned"`, several names or `"any"` to choose from."""
-    modulus_Pa: Positive | Literal["fit"] | ByHand = 1.0
-    """Modulus in Pa, a list for several modes, or `"fit"`."""
-    relaxation_time_s: Positive | Literal["fit"] | ByHand = 1.0
-    """Relaxation time in s, a list for several modes, or `"fit"`."""
+    modulus_Pa: Positive | Literal["fit"] | ByHand | None = None
+    """Modulus in Pa, a list for modes, or `"fit"`, as where left out; of computed data 1."""
+    relaxation_time_s: Positive | Literal["fit"] | ByHand | None = None
+    """Relaxation time in s, likewise. Without both, modes are those of `lve.csv` where there is
+    one."""
     modes: Literal["lve"] | Annotated[int, Field(strict=True, ge=1, le=MOST_MODES)] | None = None
     """Modes from `lve.csv`: `"lve"` for as many as it supports, or a number of them."""
     sweep_rad_s: tuple[Positive, Positive] | None = None

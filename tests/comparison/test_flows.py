@@ -189,6 +189,17 @@ def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
     assert np.mean(knots < 1.0) > 2.0 / 20.0
 
 
+def test_a_rate_is_followed_to_its_ends_where_an_outlier_stood_there():
+    times = np.linspace(0.0, 10.0, 201)
+    keep = evenly_chosen(len(times), 21)
+    keep[[0, -1]] = False
+    knots, rates = followed_rate(times, np.sin(times), keep)
+    assert (knots[0], knots[-1]) == (0.0, 10.0)
+    # the strain is right to 0.1 % of its range, 1 − cos from 0 to 2
+    strain = cumulative_trapezoid(rates, knots, initial=0.0)
+    assert np.max(np.abs(strain - (1.0 - np.cos(knots)))) < 2e-3
+
+
 def test_a_short_record_is_left_as_it_is():
     data = oscillations(400)
     thinned = thinned_to(data, 400)

@@ -63,14 +63,14 @@ def divided(data):
 
 def taken_out(data, effects, of_fluid=("giesekus_mobility",)):
     """Return data without known effects, beside what a short search finds, and what these did."""
-    declared = with_known(declared_fluid(None, data), effects)
+    declared = with_known(declared_fluid(Fluid(), data), effects)
     task = Task.of_runs(data, forward_model(declared), effects=of_fluid, max_effects=1)
     return without_instrument(divided(data), search(task).ended(), declared.effects)
 
 
 def taken(data, effects):
     """Return what learners are given where effects are known."""
-    declared = with_known(declared_fluid(None, data), effects)
+    declared = with_known(declared_fluid(Fluid(), data), effects)
     task = Task.of_runs(data, forward_model(declared), effects=["stress_offset"], max_effects=0)
     return known_part(declared, search(task).ended(), divided(data), (), ())
 
@@ -174,7 +174,7 @@ def compared(data, store=None, **model):
             {"data": {"folder": "f"}, "compare": {"library": {"degree": 0}}, "model": model}
         )
         declared = with_known(
-            declared_fluid(None, data), model.get("effects"), model.get("free", ())
+            declared_fluid(Fluid(), data), model.get("effects"), model.get("free", ())
         )
         whole = StudyData(data, data.select(data.names[1:]), data.select(data.names[:1]))
         return compare(study, data=whole, declared=declared, store=store)

@@ -122,6 +122,12 @@ def test_what_needs_a_fit_says_so(learner):
             call(DATA)
 
 
+def test_half_a_character_in_a_table_is_an_input_error_and_not_one_of_a_file():
+    samples = pd.DataFrame({"time_s": [0.0, 1.0], "shear_rate_1_s": 1.0, "stress_Pa": "\ud800"})
+    with pytest.raises(dc.InputError, match="ud800"):
+        dc.from_dataframe(samples)
+
+
 def test_lists_and_series_are_columns_too():
     # control: what is refused above is not refused for being no array
     made = run(time=list(TIMES), rate=pd.Series(RATES), stress=STRESS.astype(object))

@@ -86,6 +86,31 @@ def test_a_wrong_law_is_said_to_leave_a_systematic_misfit(data):
     assert wrong.text.count("systematic") == 1
 
 
+def test_a_prediction_is_one_row_after_the_other_as_of_an_estimator(data, fitted):
+    times = np.linspace(0.05, 8.0, 80)
+    exact = [giesekus_start_up(rate, times) for rate in (0.5, 1.5, 3.0, 6.0)]
+    # constants from 240 samples of 1 % noise: predictions are off by less than 1 %
+    np.testing.assert_allclose(fitted.predict(data), np.concatenate(exact), rtol=0.01)
+
+
+def test_a_yield_stress_is_found_in_creep_from_the_starts_of_the_fit_itself():
+    # an elastic Bingham solid in closed form: γ = σ/G, and above τ_y flow at (σ − τ_y)/η besides;
+    # rates are so slow (λγ̇ < 0.06) that normal stresses, which Saramito's has, are below the noise
+    modulus, viscosity, yield_stress, times = 1000.0, 20.0, 50.0, np.linspace(0.02, 10.0, 60)
+    lot, frames = np.random.default_rng(4), []
+    for stress in (20.0, 40.0, 70.0, 100.0):
+        strain = stress / modulus + max(stress - yield_stress, 0.0) / viscosity * times
+        noise = NOISE * np.sqrt(np.mean(strain**2)) * lot.standard_normal(len(times))
+        table = {"run": f"{stress:g}", "time_s": times, "stress_Pa": stress}
+        frames.append(pd.DataFrame(table | {"strain": strain + noise}))
+    runs = pd.DataFrame({"run": [one["run"][0] for one in frames], "control": "stress"})
+    found = dc.fit("saramito", dc.from_dataframe(pd.concat(frames), runs))
+    # the misfit is the noise, to a tenth as of 240 samples; a wrong start ends at 30 %
+    assert found.error == pytest.approx(NOISE, rel=0.2)
+    told = found.summary()["value"]
+    assert told["modulus_Pa"] * told["yield_strain"] == pytest.approx(yield_stress, rel=0.05)
+
+
 def oldroyd_b(rate, times, viscosity=12.0, modulus=50.0, time=1.2):
     """Closed form of the upper-convected Maxwell start-up beside a solvent."""
     return rate * (modulus * time * (1.0 - np.exp(-times / time)) + viscosity)

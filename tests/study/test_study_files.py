@@ -292,6 +292,23 @@ def declared(*lines, elastic=0.0):
     return declared_model(parse_study(content), Dataset("x", (), sweep(elastic)))
 
 
+def test_modes_that_nobody_declares_are_the_sweeps_or_fitted_and_those_of_computed_data_one(
+    tmp_path,
+):
+    of_sweep = declared("")
+    np.testing.assert_allclose(of_sweep.modulus, MODULUS, rtol=0.05)
+    assert of_sweep.free == ()
+    folder = parse_study({"data": {"folder": str(make_folder(tmp_path))}})
+    alone = declared_model(folder, load_study_data(folder).dataset)
+    assert alone.free == ("modulus_Pa", "relaxation_time_s")
+    half = parse_study({"data": {"folder": folder.data.folder}, "model": {"modulus_Pa": 3.0}})
+    one = declared_model(half, load_study_data(half).dataset)
+    assert (one.modulus.tolist(), one.free) == ([3.0], ("relaxation_time_s",))
+    computed = parse_study({"data": SYNTHETIC})
+    exact = declared_model(computed, load_study_data(computed).dataset)
+    assert (exact.modulus.tolist(), exact.relaxation_time.tolist(), exact.free) == ([1], [1], ())
+
+
 def test_the_solvent_of_the_sweep_is_found_and_its_error_handed_on():
     model = declared('modes = "lve"')
     assert model.solvent_viscosity == pytest.approx(SOLVENT, rel=0.05)

@@ -35,6 +35,21 @@ _FEWEST_RATIOS, _STEADY_RATIO, _FEWEST_GAINS = 5, 0.05, 3
 _CLEAR_OF_ZERO = 0.3  # where the stress passes through zero its ratio says nothing
 # Of gains that differ: what a law that thins leaves of linear theory at small strain, and chance
 _STILL_LINEAR, _UNLIKELY = 0.01, 1e-3
+# Units that are taken for others, and what then makes the numbers right
+_MISTAKEN: dict[str, dict[str, float]] = {
+    "a stress in kPa that is read in Pa": {"stress": 1e3},
+    "a stress in MPa that is read in Pa": {"stress": 1e6},
+    "a stress in dyn/cm2 that is read in Pa": {"stress": 0.1},
+    "a shear rate in 1/min that is read in 1/s": {"rate": 1.0 / 60.0},
+    "a shear rate in %/s that is read in 1/s": {"rate": 0.01},
+    "a time in ms that is read in s": {"time": 1e-3},
+    "a time in min that is read in s": {"time": 60.0},
+    "a time in h that is read in s": {"time": 3600.0},
+}
+# Share of the small strains that then agree with the sweep, which as they stand do not, and by how
+# much the stress changes among them: a level alone may agree by chance. Damping functions are 0.9
+# and more up to that strain, and units differ by 10 at least
+_AGREE, _RISE, _UNIT_STRAIN = 0.8, 3.0, 0.5
 # Well below a Weissenberg number of one the Cox–Merz rule holds to some ten per cent for simple
 # fluids; above it laws differ, and it is theirs to say. A Maxwell fluid is off by 1.3 at 0.83
 _COX_MERZ_FACTOR, _COX_MERZ_RATE = 1.3, 0.8
@@ -159,10 +174,30 @@ def against_linear_theory(
     if runs and not spectrum.elastic_modulus and number < 0.1:
         yield found("all_linear", time=mean_time, number=number)
     linear = {run.name: _linear_part(run, sweep, spectrum) for run in runs if run.flows}
+    if units := _mistaken_units([run for run in runs if run.flows], sweep, spectrum):
+        yield found("mistaken_unit", SWEEP_FILE, units=" or ".join(units))
+        return
     yield from _shared_gain(runs, linear, sweep, spectrum)
     for run in runs:
         if is_start_up(run):
             yield from _of_start_up(run, *linear[run.name], sweep, mean_time)
+
+
+def _mistaken_units(
+    runs: Sequence[Run], sweep: LinearSweep, spectrum: RelaxationSpectrum
+) -> list[str]:
+    """Return which units in place of those read make all runs together agree with the sweep."""
+
+    def agreement(**factors: float) -> float:
+        parts = [_linear_part(run, sweep, spectrum, _UNIT_STRAIN, **factors) for run in runs]
+        stress, linear = map(np.concatenate, zip(*parts, strict=True))
+        if len(stress) < _FEWEST_RATIOS or np.ptp(np.log(np.abs(linear))) < np.log(_RISE):
+            return 0.0
+        return float(np.mean(np.abs(stress / linear - 1.0) < _STRESS_TOLERANCE))
+
+    if not runs or agreement() > 1.0 - _AGREE:
+        return []
+    return [unit for unit, factors in _MISTAKEN.items() if agreement(**factors) >= _AGREE]
 
 
 def _of_start_up(
@@ -202,19 +237,20 @@ def _linear_stress(
 
 
 def _linear_part(
-    run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum
-) -> tuple[Values, Values]:
-    """Stresses and those of linear theory until the strain first exceeds its limit."""
-    rates, times = np.append(run.rate[0], run.rate), np.append(0.0, run.time)
+    run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum, limit: float = _LINEAR_STRAIN,
+    stress: float = 1.0, rate: float = 1.0, time: float = 1.0,
+) -> tuple[Values, Values]:  # fmt: skip
+    """Stresses, times a factor, and those of linear theory until the strain exceeds a limit."""
+    rates, times = rate * np.append(run.rate[0], run.rate), time * np.append(0.0, run.time)
     strain = np.abs(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
-    n = int(np.argmax(np.append(strain, np.inf) >= _LINEAR_STRAIN))
+    n = int(np.argmax(np.append(strain, np.inf) >= limit))
     linear = _linear_stress(times[: n + 1], rates[: n + 1], spectrum)
     size = np.abs(linear)
-    use = size > 5 * stress_noise(run)
+    use = size > 5 * stress * stress_noise(run)
     use &= size > _CLEAR_OF_ZERO * np.maximum.accumulate(size)
     # times shorter than those of the sweep are extrapolation
-    use &= run.time[:n] > 1.0 / np.max(sweep.angular_frequency)
-    return run.stress[:n][use], linear[use]
+    use &= times[1 : n + 1] > 1.0 / np.max(sweep.angular_frequency)
+    return stress * run.stress[:n][use], linear[use]
 
 
 def _gain(run: Run, stress: Values, linear: Values) -> tuple[float, float] | None:

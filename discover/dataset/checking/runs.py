@@ -182,9 +182,11 @@ def _of_rise(run: Run) -> Iterator[Finding]:
     stress, noise = run.stress * np.sign(run.rate[0]), stress_noise(run)
     half = int(np.argmax(stress >= 0.5 * np.max(stress)))
     if half < _FEWEST_ON_THE_RISE:
-        yield found("few_on_the_rise", run.name, samples=half, fewest=_FEWEST_ON_THE_RISE)
+        yield found(
+            "few_on_the_rise", run.name, samples=counted(half, "sample"), fewest=_FEWEST_ON_THE_RISE
+        )
     lost = (np.abs(stress) < 3.0 * noise) | (stress < 0)
-    if np.mean(lost) > 0.2:
+    if np.mean(lost) > 0.2 and len(run) >= FEWEST_SAMPLES:  # fewer show no noise
         last = run.time[np.flatnonzero(lost)[-1]]
         percent = 100 * float(np.mean(lost))
         yield found("lost_in_noise", run.name, percent=percent, noise=noise, last=last)

@@ -33,7 +33,7 @@ _FEWEST_LEFT = 10
 # predicts a modulus and a time that are off leave this factor open
 _SLOW, _SECOND_ORDER_FACTOR = 0.3, 3.0
 # Laun's rule is one of experience, and holds to some ten per cent where Cox's and Merz's does
-_COX_MERZ, _LAUN_FACTOR = 1.15, 2.0
+_COX_MERZ, _LAUN_FACTOR, _LARGEST_RATIO = 1.15, 2.0, 5.0
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25
@@ -184,7 +184,11 @@ def _laun(run: Run, rate: float, end: float, sweep: LinearSweep) -> Iterator[_Fa
         for values in (sweep.storage_modulus, sweep.loss_modulus)
     )
     rule = 2.0 * storage * (1.0 + (storage / loss) ** 2) ** 0.7
-    holds = 1.0 / _COX_MERZ < steady / np.hypot(storage, loss) < _COX_MERZ
+    # one mode far above its frequency has a ratio of moduli that no melt of Laun's had
+    holds = (
+        storage <= _LARGEST_RATIO * loss
+        and 1.0 / _COX_MERZ < steady / np.hypot(storage, loss) < _COX_MERZ
+    )
     if holds and not rule / _LAUN_FACTOR <= end <= rule * _LAUN_FACTOR:
         yield _Fault(
             f"ends at {end:.3g} Pa where Laun's rule has {rule:.3g} Pa, though the stress of the "

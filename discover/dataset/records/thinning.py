@@ -85,7 +85,7 @@ def followed_rate(
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)
     most = _FOLLOWED * np.ptp(strain), _FOLLOWED_RATE * np.max(np.abs(shear_rate))
-    knots = np.flatnonzero(keep)
+    knots = np.union1d(np.flatnonzero(keep), [0, len(time) - 1])
     while len(knots) < len(time):
         at = time[knots]
         spline = make_lsq_spline(time, shear_rate, np.r_[at[0], at, at[-1]], k=1, w=weights)

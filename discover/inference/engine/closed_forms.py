@@ -22,6 +22,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import get_lapack_funcs
 
 from discover.dataset import Run
+from discover.protocols import strains
 from discover.protocols.kinematics import MODULI
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
@@ -95,9 +96,15 @@ def strain_of(run: Run) -> Float[np.ndarray, " n"]:
 
 
 def integrated_rate(run: Run) -> Float[np.ndarray, " n"]:
-    """Return the strain at each sample, from rest, of the rate as it was recorded."""
+    """Return the strain at each sample, from rest, of the rate as it was recorded.
+
+    A step of strain before the record counts; a flow that had gone on does not.
+    """
     time, rate = np.asarray(run.time), np.asarray(run.rate)
-    return rate[0] * time[0] + cumulative_trapezoid(rate, time, initial=0.0)
+    is_step = not (run.from_rest or run.rate_before or np.any(run.protocol.cycle))
+    begins = np.array([float(run.protocol.begins)])
+    step = -float(strains(run.protocol, begins)[0]) if is_step else 0.0
+    return step + rate[0] * time[0] + cumulative_trapezoid(rate, time, initial=0.0)
 
 
 def _relaxing(run: Run, time: float) -> Float[np.ndarray, " n"]:
