@@ -35,5 +35,5 @@ def test_every_variable_of_relaxation_after_steps_is_a_number():
     found = {one.slot: one for one in variables(problem.fitted)}
     assert found["network"].largest == 2.0
     for one in found.values():
-        columns = one.columns(problem.fitted.recorded, problem.fitted.size)
+        columns = one.columns(problem.fitted.recorded)
         assert np.all(np.isfinite(columns))
