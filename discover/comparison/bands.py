@@ -255,8 +255,8 @@ def _band(
 def _missed(found: Found, fit: Fit, run: Run) -> float:
     """Return the deviation, over its size, by which a run may be missed, from runs left out."""
     posterior = found.posterior
-    alone = posterior.left is None or posterior.has_function(fit)
-    best = fit if alone else posterior.left.fit
+    left = None if posterior.has_function(fit) else posterior.left
+    best = fit if left is None else left.fit
     missed, fastest = posterior.missed(best), posterior.problem.fitted.fastest
     wider = of_the_next_run(len(missed))
     worse = max(misfit(posterior, fit) / misfit(posterior, best), 1.0)
