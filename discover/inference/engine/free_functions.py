@@ -46,76 +46,116 @@ _LAWS = 4
 
 @in_one_thread
 def free_functions(posterior: Posterior) -> list[FreeFunction]:
-    """Return the functions that are possible beside all other explanations, the likeliest first.
-
-    They are tried beside hypotheses of few effects: a larger one may have taken up what they are.
-    A small one may have too, so what is possible is fitted beside all of these.
-    """
-    search, problem, left = posterior.search, posterior.problem, posterior.left
-    rows = search.fitter.rows
-    if left is None or not all(
-        r.protocol.control == "rate" and r.flow == "shear" for r in rows.runs
+    """Return the functions that are possible beside all other explanations, the likeliest first."""
+    fitter = posterior.search.fitter
+    runs = fitter.rows.runs
+    if posterior.left is None or not all(
+        run.protocol.control == "rate" and run.flow == "shear" for run in runs
     ):
         return []
-    fits = [f for f in search.found.values() if f.covariance is not None and not f.at_an_end]
-    fits.sort(key=lambda fit: -fit.log_likelihood)
-    bases = [
-        [fit for fit in fits if len(fit.names) == size][:_BASES]
-        for size in range(_LARGEST_BASE + 1)
-    ]
-    # effects by name that the search passed over, for beside a function others are likely
-    known = {fit.names for fit in bases[1]}
-    named = [effect.name for effect in problem.candidates if not isinstance(effect, LibraryTerm)]
-    single = [search.fitter.start((name,), problem.zero) for name in named if (name,) not in known]
-    whole, _, discrepancies = posterior.memory["whole"]
-    other, in_all = _likeliest(search, [left]), _likeliest(whole, discrepancies)
-    prior, found = problem.log_odds_of(TERM_ODDS), []
-
-    def rank_of(fit: Fit) -> float:
-        return search.rank(fit) + prior
-
     functions: list[list[WithFunction | WithSlip]] = [
-        [WithFunction(search.fitter, variable, width) for width in WIDTHS]
-        for variable in variables(rows)
+        [WithFunction(fitter, variable, width) for width in WIDTHS]
+        for variable in variables(fitter.rows)
     ]
-    functions.append([WithSlip(search.fitter, width) for width in SLIPS])
-    for one in (_starts(search.fitter, some, [*chain(*bases)]) for some in functions):
-        fitted = [(fitter, fit) for fitter, starts in one for fit in fitter.fit(starts, wanted=1)]
-        if not fitted:
-            continue
-        fitter, fit = max(fitted, key=lambda pair: rank_of(pair[1]))
-        if rank_of(fit) - other < _WORTH_IT:
-            continue
-        starts = [fitter.beside(base, fit) for base in chain(*bases)]
-        curves = [fit, *fitter.fit(starts, wanted=1, known=[fit])]
-        if max(map(rank_of, curves)) > other:  # of which those that start far away are worth it
-            curves += fitter.fit([fitter.beside(base, fit) for base in single])
-        fit, reported = max(curves, key=rank_of), fitter
-        odds, again = -np.inf, fitter.on(whole.fitter)
-        if again is not None:
-            (refit,) = again.fit([again.start(fit.names, fit.theta)])
-            odds = refit.log_evidence - fit.log_evidence
-        weighed = _weighed(curves, rank_of)
-        if isinstance(fitter, WithFunction) and not isinstance(fitter.variable, Response):
-            closed, known = fitter.closed([one for one, _ in weighed[:_LAWS]])
-            if max(map(rank_of, known), default=-np.inf) > rank_of(fit):
-                fitter, weighed = closed, _weighed(known, rank_of)
-        rank = rank_of(weighed[0][0])
-        odds += rank - in_all
-        if max(rank - other, odds) > _POSSIBLE:
-            variable, (grid, value, half), nearest = reported.curve(fit)
-            # a function may take up what an effect does, or an effect what it does
-            likely = [one.names for one, _ in weighed if rank_of(one) > rank - NEAR]
-            beside = min((one for one in likely if set(one) <= set(likely[0])), key=len)
-            law = next(one for one, _ in weighed if one.names == beside)
-            form = FreeForm(
-                variable.slot, variable.name, variable.unit, beside,
-                grid, value, value - half, value + half, nearest, _constants(problem, law),
-            )  # fmt: skip
-            left = Discrepancy(fitter, weighed[0][0]) if rank > other else None
-            log_odds = float(rank - other), float(odds)
-            found.append(FreeFunction(form, weighed, fitter, *log_odds, left))
+    functions.append([WithSlip(fitter, width) for width in SLIPS])
+    laws = _Laws(posterior, posterior.left)
+    found = [one for some in functions if (one := laws.with_likeliest(some)) is not None]
     return sorted(found, key=lambda one: -one.log_odds)
+
+
+class _Laws:
+    """Hypotheses of few effects beside which functions are tried, and what these are held against.
+
+    A larger one may have taken up what a function is. A small one may have too, so that a function
+    that is possible beside one is fitted beside all of these.
+
+    `few`: the likeliest of each size. `others`: effects by name that the search passed over, which
+    may be likely beside a function.
+    """
+
+    def __init__(self, posterior: Posterior, left: Discrepancy):
+        self.search, self.problem = posterior.search, posterior.problem
+        fits = [
+            fit
+            for fit in self.search.found.values()
+            if fit.covariance is not None and not fit.at_an_end
+        ]
+        fits.sort(key=lambda fit: -fit.log_likelihood)
+        sizes = range(_LARGEST_BASE + 1)
+        of_size = [[fit for fit in fits if len(fit.names) == size][:_BASES] for size in sizes]
+        self.few = [*chain(*of_size)]
+        tried = {fit.names for fit in self.few}
+        self.others = [
+            self.search.fitter.start((effect.name,), self.problem.zero)
+            for effect in self.problem.candidates
+            if not isinstance(effect, LibraryTerm) and (effect.name,) not in tried
+        ]
+        self.whole, _, discrepancies = posterior.memory["whole"]
+        self.alone = _likeliest(self.search, [left])
+        self.alone_in_all = _likeliest(self.whole, discrepancies)
+
+    def rank(self, fit: Fit) -> float:
+        """Return the log of evidence times prior of a law with a function."""
+        return self.search.rank(fit) + self.problem.log_odds_of(TERM_ODDS)
+
+    def with_likeliest(self, functions: Sequence[WithFunction | WithSlip]) -> FreeFunction | None:
+        """Return the likeliest of functions of one variable; None where none is possible."""
+        fitted = [
+            (fitter, fit)
+            for fitter, starts in _starts(self.search.fitter, functions, self.few)
+            for fit in fitter.fit(starts, wanted=1)
+        ]
+        if not fitted:
+            return None
+        curve, fit = max(fitted, key=lambda pair: self.rank(pair[1]))
+        if self.rank(fit) - self.alone < _WORTH_IT:
+            return None
+        fits = [
+            fit,
+            *curve.fit([curve.beside(law, fit) for law in self.few], wanted=1, known=[fit]),
+        ]
+        if max(map(self.rank, fits)) > self.alone:  # those that start far away are worth it too
+            fits += curve.fit([curve.beside(law, fit) for law in self.others])
+        fitter, weighed = curve, _weighed(fits, self.rank)
+        fit, _ = weighed[0]
+        gained = self._gained_in_all(curve, fit)
+        if isinstance(curve, WithFunction) and not isinstance(curve.variable, Response):
+            closed, known = curve.closed([one for one, _ in weighed[:_LAWS]])
+            if max(map(self.rank, known), default=-np.inf) > self.rank(fit):
+                fitter, weighed = closed, _weighed(known, self.rank)
+        rank = self.rank(weighed[0][0])
+        odds, in_all = rank - self.alone, rank + gained - self.alone_in_all
+        if max(odds, in_all) < _POSSIBLE:
+            return None
+        form = self._form(curve, fit, weighed)
+        left = Discrepancy(fitter, weighed[0][0]) if odds > 0.0 else None
+        return FreeFunction(form, weighed, fitter, float(odds), float(in_all), left)
+
+    def _gained_in_all(self, fitter: WithFunction | WithSlip, fit: Fit) -> float:
+        """Return how much larger the log evidence is of all runs than of the fitted ones."""
+        again = fitter.on(self.whole.fitter)
+        if again is None:
+            return -np.inf
+        (refit,) = again.fit([again.start(fit.names, fit.theta)])
+        return refit.log_evidence - fit.log_evidence
+
+    def _form(
+        self,
+        curve: WithFunction | WithSlip,
+        fit: Fit,
+        weighed: Sequence[tuple[Fit, float]],
+    ) -> FreeForm:
+        """Return a curve as the result shows it, of the law beside which it is the likeliest."""
+        variable, (grid, value, half), nearest = curve.curve(fit)
+        # a function may take up what an effect does, or an effect what it does
+        best = self.rank(weighed[0][0])
+        likely = [one for one, _ in weighed if self.rank(one) > best - NEAR]
+        inside = (one for one in likely if set(one.names) <= set(likely[0].names))
+        law = min(inside, key=lambda one: len(one.names))
+        return FreeForm(
+            variable.slot, variable.name, variable.unit, law.names,
+            grid, value, value - half, value + half, nearest, _constants(self.problem, law),
+        )  # fmt: skip
 
 
 def _constants(problem: Problem, fit: Fit) -> dict[str, dict[str, tuple[float, float, float]]]:
