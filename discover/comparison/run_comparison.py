@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -214,10 +213,10 @@ def _determined_beside(
     if not in_shear or found.ended().verdict == "no_signal":
         return lambda terms: None
     normal = study.compare.use_normal_stresses
-    of = partial(
-        structure_of, runs=frame.data.fit.runs, library=library, model=frame.model,
-        use_normal_stresses=normal,
-    )  # fmt: skip
+
+    def of(terms: Sequence[LawTerm]) -> Structure:
+        return structure_of(terms, frame.data.fit.runs, library, frame.model, normal)
+
     likeliest = () if not found.posterior.fits else terms_of(found.posterior.fits[0][0], found)
     foreseen = () if likeliest is None else likeliest
     ahead = pool.submit(copy_context().run, of, foreseen)
