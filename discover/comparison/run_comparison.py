@@ -206,21 +206,15 @@ def _determined_beside(
 ) -> _Determined:
     """Return what says what the runs determine at the terms of a law; None without shear.
 
-    It is computed beside what learns at the terms of the likeliest hypothesis, which proposals
-    seldom change: at a first start its program takes as long to compile as a learner learns.
+    What they determine at the known part is computed beside what learns: at a first start its
+    program takes as long to compile as a learner learns.
     """
     in_shear = any(flow.in_shear for flow in frame.flows if flow.kind == "training")
     if not in_shear or found.ended().verdict == "no_signal":
         return lambda terms: None
-    normal = study.compare.use_normal_stresses
-
-    def of(terms: Sequence[LawTerm]) -> Structure:
-        return structure_of(terms, frame.data.fit.runs, library, frame.model, normal)
-
-    likeliest = () if not found.posterior.fits else terms_of(found.posterior.fits[0][0], found)
-    foreseen = () if likeliest is None else likeliest
-    ahead = pool.submit(copy_context().run, of, foreseen)
-    return lambda terms: ahead.result() if tuple(terms) == foreseen else of(terms)
+    of = frame.data.fit.runs, library, frame.model, study.compare.use_normal_stresses
+    alone = pool.submit(copy_context().run, structure_of, (), *of)
+    return lambda terms: structure_of(terms, *of, alone.result())
 
 
 def _with_what_is_open(
