@@ -57,17 +57,16 @@ def by_time(
 ) -> Callable[..., None]:
     """Return what passes on lines with the seconds to come, as the fraction of all time.
 
-    It never falls. While the seconds are not known (None), a fraction stands in their place.
+    It never falls, and is zero while the seconds are not known (None).
     """
     begun = progress.begun if isinstance(progress, FollowedBy) else clock()
     largest = 0.0
 
-    def say(text: str, left: float | None, fraction: float = 0.0) -> None:
+    def say(text: str, left: float | None) -> None:
         nonlocal largest
         passed = clock() - begun
         if left is not None:
-            fraction = passed / max(passed + left, 1e-9)
-        largest = max(largest, min(fraction, 1.0))
+            largest = max(largest, min(passed / max(passed + left, 1e-9), 1.0))
         (progress or silent)(text, largest)
 
     return say
@@ -118,10 +117,6 @@ def slowness() -> float:
     return min(times) / _REFERENCE
 
 
-STATES = 0.125
-"""Fraction that is done when states alone begin to be searched. It is of the drawing too."""
-
-
 class FollowedBy:
     """Progress of a part from the beginning, after which others take so many seconds.
 
@@ -146,7 +141,7 @@ class FollowedBy:
 
     def __call__(self, text: str, fraction: float) -> None:
         """Pass on a line, with the fraction of all time."""
-        if fraction > STATES:
+        if fraction > 0.0:
             passed = self._clock() - self.begun
             fraction = passed / (passed / fraction + self._seconds * self._crowding())
         self._largest = max(self._largest, fraction)

@@ -26,7 +26,7 @@ from discover.study.run_folder import RunFolder
 from discover.study.schema import Study, Verdict
 from discover.validation import validated
 
-_DRAWING, _DRAWING_RUN = {"compare": 1.6, "close-loop": 0.6}, 0.1
+_DRAWING, _DRAWING_RUN = {"compare": 1.6, "close-loop": 0.65}, 0.08
 """Seconds in which the pictures of a page are drawn, by task, on a machine of its own; those of a
 loop further ones for each run."""
 

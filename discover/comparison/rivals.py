@@ -185,8 +185,14 @@ def structure_of(
     library: TermLibrary,
     model: StudyModel,
     use_normal_stresses: bool,
+    alone: identify.Structure | None = None,
 ) -> identify.Structure:
-    """Return what the flows of these runs determine, at the known part and at the law found."""
+    """Return what the flows of these runs determine, at the known part and at the law found.
+
+    `alone`: the same at the known part, where that is known.
+    """
     found = LawTerms.of(terms)
     nominal = {FOUND: found} if found.coefficients else {}
-    return identify.analyse_structure(runs, library, model.fluid, nominal, use_normal_stresses)
+    return identify.analyse_structure(
+        runs, library, model.fluid, nominal, use_normal_stresses, alone
+    )

@@ -1,7 +1,9 @@
 """Comparison of a study, part by part, so that a run that was stopped can go on."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +30,7 @@ from discover.comparison.rivals import Rival, exact_twins, explanations_apart, s
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
+from discover.identify import Structure
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
@@ -42,7 +45,7 @@ from discover.study.declared_model import StudyModel, declared_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import counted
-from tensor_library import TermLibrary
+from tensor_library import LawTerm, TermLibrary
 
 
 def data_in_words(data: StudyData, study: Study) -> str:
@@ -122,7 +125,9 @@ def compare(
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     times.learning()
 
-    own = learning.outcomes(options.learners, frame, times.learned)
+    with ThreadPoolExecutor(1) as beside:
+        determined = _determined_beside(beside, found, frame, study, library)
+        own = learning.outcomes(options.learners, frame, times.learned)
     times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
@@ -157,7 +162,7 @@ def compare(
             data.dataset, study.data.material, data.dataset.name
         ),
     )  # fmt: skip
-    comparison = _with_what_is_open(comparison, found, frame, data, study, library)
+    comparison = _with_what_is_open(comparison, found, frame, data, study, library, determined)
     progress("done", 1.0)
     return comparison
 
@@ -193,9 +198,28 @@ def _of_material(
     )  # fmt: skip
 
 
+_Determined = Callable[[Sequence[LawTerm]], Structure | None]
+
+
+def _determined_beside(
+    pool: ThreadPoolExecutor, found: Found, frame: Frame, study: Study, library: TermLibrary
+) -> _Determined:
+    """Return what says what the runs determine at the terms of a law; None without shear.
+
+    What they determine at the known part is computed beside what learns: at a first start its
+    program takes as long to compile as a learner learns.
+    """
+    in_shear = any(flow.in_shear for flow in frame.flows if flow.kind == "training")
+    if not in_shear or found.ended().verdict == "no_signal":
+        return lambda terms: None
+    of = frame.data.fit.runs, library, frame.model, study.compare.use_normal_stresses
+    alone = pool.submit(copy_context().run, structure_of, (), *of)
+    return lambda terms: structure_of(terms, *of, alone.result())
+
+
 def _with_what_is_open(
     comparison: Comparison, found: Found, frame: Frame, data: StudyData, study: Study,
-    library: TermLibrary,
+    library: TermLibrary, determined: _Determined,
 ) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
@@ -209,10 +233,7 @@ def _with_what_is_open(
     if terms is None:
         sparse = comparison.outcomes.get("tensor_sindy")
         terms = () if sparse is None else tuple(term.in_law for term in sparse.terms)
-    structure = None
-    if any(flow.in_shear for flow in frame.flows if flow.kind == "training"):
-        normal = study.compare.use_normal_stresses
-        structure = structure_of(terms, frame.data.fit.runs, library, frame.model, normal)
+    structure = determined(terms)
     twins: list[Rival] = []
     if comparison.verdict == "explained":
         twins = exact_twins(terms, frame.model, frame.flows, library)

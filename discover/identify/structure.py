@@ -199,12 +199,16 @@ class Structure(NotebookView):
         }
 
 
+_ALONE = "the known part alone"
+
+
 def analyse_structure(
     runs: Sequence[Run],
     library: TermLibrary,
     known: Fluid | None = None,
     nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None,
     use_normal_stresses: bool = False,
+    alone: Structure | None = None,
 ) -> Structure:
     """Return what shear flows can determine of a library's coefficients.
 
@@ -233,14 +237,17 @@ def analyse_structure(
         for quantity, column in normal.items()
         if use_normal_stresses and any(getattr(run, column) is not None for run in runs)
     ]
+    if alone is not None and alone.n_terms == len(library):
+        found, relations = [*alone.laws], alone.relations
+    else:
+        found, relations, laws = [], term_relations(library), {_ALONE: LawTerms({}), **laws}
     longest = max(map(len, runs))
     samples = np.arange(longest) < np.array([[len(run)] for run in runs])
-    found = []
-    for name, law in {"the known part alone": LawTerms({}), **laws}.items():
+    for name, law in laws.items():
         one = _at(known, flows, samples, total, library, name, law, ["sigma12", *also])
         if one is not None:
             found.append(one)
-    return Structure(tuple(found), term_relations(library), len(library))
+    return Structure(tuple(found), relations, len(library))
 
 
 def _at(

@@ -1,18 +1,20 @@
 """Is what a law leaves of the runs that it was learned from noise? The posterior says."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from discover.dataset.run import Run
+from discover.effects.registry import KnownEffect, built_in_effects
 from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Search
-from discover.laws import Fluid
+from discover.laws import Fluid, UpperConvectedMaxwell
+from discover.laws.expansion import LibraryExpansion, in_shared_form
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import noise_beside
 from discover.words import percent_of
@@ -71,6 +73,26 @@ def declared_as(known: Fluid) -> DeclaredModel:
     )
 
 
+def _with_terms_as_effects(model: DeclaredModel) -> DeclaredModel:
+    """Return a model whose law's terms are effects beside the law below, if all are built in.
+
+    Code of that law with effects holds these terms: a search has made it, and no other is needed.
+    """
+    law = model.law
+    below = getattr(law, "base", None)
+    terms = in_shared_form(law if below is None else replace(law, base=None))
+    if not isinstance(terms, LibraryExpansion):
+        return model
+    effects = built_in_effects()
+    known = tuple(
+        KnownEffect(effects[name], (float(value),))
+        for name, value in zip(terms.library.names, np.asarray(terms.coefficients), strict=True)
+        if value != 0.0
+    )
+    core = UpperConvectedMaxwell(law.linear_relaxation) if below is None else below
+    return replace(model, law=core, effects=known)
+
+
 def lack_of_fit(
     fluid: Fluid,
     runs: Sequence[Run],
@@ -82,7 +104,8 @@ def lack_of_fit(
 
     `noise`, `loading`, `computed`: as of a `Problem`.
     """
-    problem = Problem(declared_as(fluid), (), runs, loading=loading, noise=noise, computed=computed)
+    declared = _with_terms_as_effects(declared_as(fluid))
+    problem = Problem(declared, (), runs, loading=loading, noise=noise, computed=computed)
     fitter = Fitter(problem, problem.fitted)
     search = Search(fitter)
     (fit,) = search.add([fitter.start((), problem.zero)])

@@ -29,7 +29,7 @@ from discover.loop.runs import MOST_SAMPLES
 from discover.loop.search_time import SearchTime
 from discover.loop.simple import simple_result
 from discover.loop.task import Say, Task
-from discover.progress import STATES, Progress, by_time
+from discover.progress import Progress, by_time
 from discover.study.data import StudyData, temperature
 from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study
@@ -107,10 +107,9 @@ def run_study(
     held_out = data.each or bool(len(data.held_out))
     several = len(model.modulus) > 1
     left = SearchTime(study.loop.max_effects, several, rounds, held_out, sheared)
-    states = not any(run.protocol.control in ("rate", "stress") for run in data.fit.runs)
 
     def say(line: str) -> None:
-        tell(line, left.heard(line), STATES if states else 0.0)
+        tell(line, left.heard(line))
 
     if data.each:
         result = run_loop_on_each(data.dataset, model, progress=say, **options)

@@ -161,8 +161,8 @@ class SearchTime:
 
 # Seconds in which learners learn, and in which laws are weighed: a constant, and what compiling
 # adds, which a crowded machine prolongs, and a share of the search's. Measured on the demonstration
-# and on LDPE.
-_LEARN, _WEIGH = (5.0, 1.0, 0.2), (4.0, 2.0, 0.25)
+# and on LDPE, at first and second starts.
+_LEARN, _WEIGH = (0.1, 11.0, 1.1), (0.7, 1.6, 0.2)
 _SLOWER = 2.0  # Factor by which learning may change what is expected of weighing
 _LEAST = 0.15  # Share of a part's expected time that is still told of it once that time is over
 

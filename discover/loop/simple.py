@@ -6,8 +6,9 @@ import numpy as np
 
 from discover.answer.simple_material import SimpleMaterial, material_of
 from discover.dataset import Run
-from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.forward import make_batch
 from discover.inference.engine.posterior import Posterior
+from discover.inference.engine.problem import Problem
 from discover.inference.engine.simple_materials import simple_material
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
@@ -36,7 +37,7 @@ def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
     records: list[RunRecord] = []
     for runs, held in ((task.fitted, False), (task.held_out, True)):
         if runs:
-            records += record_runs(runs, _predicted(task, material, runs), held)
+            records += record_runs(runs, _predicted(posterior.problem, material, runs), held)
     before, after = errors_of(records, 0), errors_of(records, 1)
     knows_times = 1 not in task.declared.free_positions
     if material.kind == "viscous" and knows_times and before.fit <= _AS_WELL * after.fit:
@@ -74,11 +75,11 @@ def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
     )  # fmt: skip
 
 
-def _predicted(task: Task, material: SimpleMaterial, runs: Sequence[Run]) -> np.ndarray:
+def _predicted(problem: Problem, material: SimpleMaterial, runs: Sequence[Run]) -> np.ndarray:
     batch = make_batch(runs)
-    model = AugmentedModel(task.declared, [], data_scales(task.fitted))
     with np.errstate(all="ignore"):
-        first = model.predictions([model.zero()], batch)[0]
+        # of the model with all candidates, whose code is made
+        first = problem.model.predictions([problem.zero], batch)[0]
     second = np.zeros_like(first)
     for i, run in enumerate(runs):
         found = material.predict(run)

@@ -211,6 +211,7 @@ class Fitter:
         derivatives: bool = True,
         wanted: int | None = None,
         known: Iterable[Fit] = (),
+        least: float = -np.inf,
     ) -> list[Fit]:
         """Return hypotheses at their likeliest constants; all take their steps side by side.
 
@@ -225,25 +226,32 @@ class Fitter:
         wanted, known
             So many of the best matter, those fitted before among them: one that cannot come near is
             given up, without these.
+        least
+            Log posterior from which on a fit counts: one that does not reach it, were all rounds
+            that are left worth the last, is given up likewise.
         """
         fits, known = list(starts), tuple(known)
         with _running_away():
             new = iter(self.predict([fit.theta for fit in fits if fit.slopes is None]))
             self._set(fits, [next(new) if fit.slopes is None else fit.predicted for fit in fits])
         active, given_up = [fit for fit in fits if np.isfinite(fit.log_posterior)], set()
-        for _ in range(rounds):
+        for left in reversed(range(rounds)):
             if not active:
                 break
             self.linearise([fit for fit in active if fit.slopes is None])
             before = [fit.log_posterior for fit in active]
             with _running_away():
                 going_on = self._stepped(active)
+            gains = [fit.log_posterior - one for fit, one in zip(active, before, strict=True)]
+            hopeless = {
+                id(fit)
+                for fit, gain in zip(active, gains, strict=True)
+                if 0.0 < gain * left < least - fit.log_posterior
+            }
             if wanted is not None:
-                gains = [fit.log_posterior - one for fit, one in zip(active, before, strict=True)]
-                hopeless = self.hopeless([*known, *fits], active, gains, wanted)
-                going_on = [fit for fit in going_on if id(fit) not in hopeless]
-                given_up |= hopeless
-            active = going_on
+                hopeless |= self.hopeless([*known, *fits], active, gains, wanted)
+            given_up |= hopeless
+            active = [fit for fit in going_on if id(fit) not in hopeless]
         if derivatives:
             usable = [
                 fit for fit in fits if np.isfinite(fit.log_posterior) and id(fit) not in given_up

@@ -76,6 +76,10 @@ _SEEN = 0.3
 _NEAR = 6.0
 """Log odds by which a law that relaxes must lead to be needed where it predicts the same."""
 
+_FAR = 40.0
+"""Log posterior behind the evidence of a law that relaxes from which on a material is not named:
+`_NEAR`, the odds of a hypothesis, and the widths of up to five constants."""
+
 
 @dataclass(frozen=True)
 class SimpleFit:
@@ -227,7 +231,10 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         return None
     from_rest = control == "rate" and all(run.from_rest for run in runs)
     laws = (*_WEIGHED[control], *((KELVIN_VOIGT,) if from_rest else ()))
-    fits = {law: _fitted(fitter, law) for law in (_NO_MATERIAL, *laws)}
+    # where nothing is left to be explained, only what comes near the likeliest that relaxes counts
+    explains = alive and posterior.verdict != "unexplained"
+    least = search.rank(alive[0]) - _FAR if explains else -np.inf
+    fits = {law: _fitted(fitter, law, least) for law in (_NO_MATERIAL, *laws)}
     nothing = fits.pop(_NO_MATERIAL)[1].log_evidence
 
     def led(law: str) -> float:
@@ -249,8 +256,8 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         for own, one in (_fitted(fitter, name) for name in _RELAXING[control]):
             if one.log_evidence > fit.log_evidence or is_same(own.record(one)):
                 return None
-    least = _SEEN * np.min(np.abs(fitter.rows.recorded)) if fitted.is_curve else 0.0
-    if law == HERSCHEL_BULKLEY and fit.theta[0] < least:
+    seen = _SEEN * np.min(np.abs(fitter.rows.recorded)) if fitted.is_curve else 0.0
+    if law == HERSCHEL_BULKLEY and fit.theta[0] < seen:
         return None
     others = -np.inf
     if alive:
@@ -272,7 +279,8 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     return SimpleFit(law, values, tuple(map(fit.interval, free)), fitted.misfit(fit), odds, onset)
 
 
-def _fitted(fitter: Fitter, law: str) -> tuple[_ClosedForm, Fit]:
-    """Return the likeliest fit of a law, and what fitted it."""
+def _fitted(fitter: Fitter, law: str, least: float = -np.inf) -> tuple[_ClosedForm, Fit]:
+    """Return the likeliest fit of a law, and what fitted it; `least`: as of `Fitter.fit`."""
     own = _ClosedForm(fitter, law)
-    return own, max(own.fit(own.starts(), _ROUNDS), key=lambda fit: fit.log_evidence)
+    fits = own.fit(own.starts(), _ROUNDS, least=least)
+    return own, max(fits, key=lambda fit: fit.log_evidence)
