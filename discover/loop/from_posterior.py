@@ -292,7 +292,8 @@ class Ended(Path):
         # neither a motor nor an inertia that is there already, nor what is fed back to the rate
         others = (one for one in problem.model.effects if one.name in names - {"solvent_viscosity"})
         alone = all(one.kind == "signal" and one.name != "instrument_inertia" for one in others)
-        known = 1 not in declared.free_positions or self.verdict not in EXPLAINED
+        of_sweep = declared.modulus_covariance is not None  # which shows that the fluid is elastic
+        known = of_sweep or 1 not in declared.free_positions or self.verdict not in EXPLAINED
         fluid = final_model.augmented_fluid(problem.model, self.theta, [*names])
         maxwell = isinstance(declared.law, UpperConvectedMaxwell) and fluid.n_modes == 1
         if known or not (alone and maxwell):
