@@ -17,6 +17,7 @@ from discover.forward.declared import DEGREE, constants_of_modes
 from discover.identify.oil_twin import oil_twin
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
+from discover.inference.engine.noise import STATED_TOO_SMALL
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
 from discover.laws import UpperConvectedMaxwell
@@ -268,7 +269,9 @@ class Ended(Path):
         changes from sample to sample.
         """
         if (known := self.posterior.problem.noise) is not None:
-            return known
+            is_all = self.verdict in EXPLAINED
+            left = errors_of(self.records, -1).fit if is_all else 0.0
+            return left if left > STATED_TOO_SMALL * known else known
         sizes = self.fit.noise.sizes
         if self.verdict in ("unexplained", "no_signal"):
             left = [r.relative_residual[-1] for r in self.records if not r.held_out]
