@@ -10,6 +10,7 @@ from discover.dataset.run import Run
 from discover.effects.registry import KnownEffect, built_in_effects
 from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fitter
+from discover.inference.engine.noise import STATED_TOO_SMALL
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Search
@@ -120,4 +121,5 @@ def lack_of_fit(
         size = float(np.mean(noise_beside(by_run, fit.noise.sizes))) if noise is None else noise
         return LackOfFit("unexplained", misfit, size, *beside)
     verdict: FitVerdict = "explained" if misfit <= ONLY_NOISE else "no_signal"
-    return LackOfFit(verdict, misfit, misfit if noise is None else noise, *beside)
+    known = noise is not None and misfit <= STATED_TOO_SMALL * noise
+    return LackOfFit(verdict, misfit, noise if known else misfit, *beside)

@@ -17,6 +17,7 @@ from discover.forward.declared import DEGREE, constants_of_modes
 from discover.identify.oil_twin import oil_twin
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
+from discover.inference.engine.noise import STATED_TOO_SMALL
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import TORQUE
 from discover.laws import UpperConvectedMaxwell
@@ -268,7 +269,9 @@ class Ended(Path):
         changes from sample to sample.
         """
         if (known := self.posterior.problem.noise) is not None:
-            return known
+            is_all = self.verdict in EXPLAINED
+            left = errors_of(self.records, -1).fit if is_all else 0.0
+            return left if left > STATED_TOO_SMALL * known else known
         sizes = self.fit.noise.sizes
         if self.verdict in ("unexplained", "no_signal"):
             left = [r.relative_residual[-1] for r in self.records if not r.held_out]
@@ -292,7 +295,8 @@ class Ended(Path):
         # neither a motor nor an inertia that is there already, nor what is fed back to the rate
         others = (one for one in problem.model.effects if one.name in names - {"solvent_viscosity"})
         alone = all(one.kind == "signal" and one.name != "instrument_inertia" for one in others)
-        known = 1 not in declared.free_positions or self.verdict not in EXPLAINED
+        of_sweep = declared.modulus_covariance is not None  # which shows that the fluid is elastic
+        known = of_sweep or 1 not in declared.free_positions or self.verdict not in EXPLAINED
         fluid = final_model.augmented_fluid(problem.model, self.theta, [*names])
         maxwell = isinstance(declared.law, UpperConvectedMaxwell) and fluid.n_modes == 1
         if known or not (alone and maxwell):

@@ -87,3 +87,11 @@ def test_errors_of_the_moduli_may_leave_a_pattern_of_their_size():
     assert lack_of_fit(dc.Fluid(**off), runs).verdict == "unexplained"
     told = dc.Fluid(**off, modulus_covariance=np.array([[0.04**2]]))
     assert lack_of_fit(told, runs).verdict == "explained"
+
+
+def test_a_noise_that_is_stated_far_too_small_is_not_what_a_law_fits_within():
+    found = lack_of_fit(LAW, records(NOISES["white"], 0), noise=0.001)
+    # three records of some 90 samples of 1 % noise: their mean is told to 5 %
+    assert found.verdict == "explained"
+    assert found.noise == pytest.approx(0.01, rel=0.2)
+    assert "0.1 %" not in found.described

@@ -28,6 +28,9 @@ _ALIKE = 4.0
 _KNOWN = 100.0
 """The same where the noise is known: within a tenth."""
 
+STATED_TOO_SMALL = 1.3
+"""What a law leaves that is all there is, over the noise as stated, from which on that is none."""
+
 LEAST = 3e-4
 """Size over the record of independent noise that is always there: what a model of a fluid is not
 told to. Records without noise differ from any integration by as much."""
