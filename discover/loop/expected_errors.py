@@ -10,6 +10,7 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
 from discover.inference.engine import Posterior
 from discover.inference.engine.fit import Fit
+from discover.inference.engine.problem import TERM_ODDS
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
 from discover.protocols import FlowProtocol, in_flow, shear_rates, start_up
@@ -148,16 +149,18 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
     By their evidence where one of them is all there is. Otherwise all miss the runs, by what each
     run has in common: R misses are draws from one normal distribution of unknown deviation, whose
     density goes as the misfit to the power −R (see `by_left_out`). What fits σ12 best need not come
-    nearest in N1, so runs count half, and a term without a law keeps its lower prior odds. A law
-    with a function beside it counts as far as that stands out.
+    nearest in N1, so runs count half, and a term without a law keeps its lower prior odds, as does
+    a function beside a law. Where that stands out and leaves nothing, it is all that counts.
     """
     if posterior.unexplained < 0.5:
         pairs = list(posterior.fits)
     else:
         problem, runs = posterior.problem, len(posterior.problem.fitted.runs)
-        found = [f for f in posterior.search.alive() if f.covariance is not None]
+        beside = [fit for curve in posterior.curves for fit, _ in curve.fits]
+        found = [f for f in (*posterior.search.alive(), *beside) if f.covariance is not None]
         logs = np.array([
             sum(np.log(problem.odds(name)) for name in fit.names)
+            + posterior.has_function(fit) * np.log(TERM_ODDS)
             - _TEMPERED * runs * np.log(misfit(posterior, fit))
             for fit in found
         ])  # fmt: skip

@@ -84,16 +84,10 @@ class Predictions:
         return fit.memory["ahead"]
 
     def _apart(self, fit: Fit, predicted: np.ndarray) -> Float[np.ndarray, " rows"]:
-        """Return the variance of what each run has of its own.
-
-        Zero, drift and loading of another run are as large as those of the fitted runs.
-        """
-        fitted, alone = self.posterior.search.fitter.errors.of_runs, self.fitter.errors.of_runs
+        """Return the variance of what each run has of its own, as large as in the fitted ones."""
         assert fit.covariance is not None
-        own_variance = np.diag(fit.covariance)[len(fit.priors) :][fitted]
-        each = (fit.linear[fitted] ** 2 + own_variance).reshape(-1, len(self.problem.fitted.runs))
-        columns = self.fitter.errors.columns(predicted, np.zeros((len(self.rows), 0)))
-        return columns[:, alone] ** 2 @ np.repeat(np.mean(each, axis=1), len(self.rows.runs))
+        variances, fitted = np.diag(fit.covariance)[len(fit.priors) :], self.posterior.search.fitter
+        return self.fitter.errors.apart(predicted, fit.linear, variances, fitted.errors)
 
     def _jacobian(self, fit: Fit, predicted: np.ndarray) -> Float[np.ndarray, "rows n"]:
         """Return derivatives of the rows, of those of the fitted runs that they share."""

@@ -130,6 +130,22 @@ class LinearErrors:
         found = predicted * (1.0 + gain) + zeros @ self._zeros.T
         return found + rest[:, :k] @ shifts.T if k else found
 
+    def apart(
+        self,
+        predicted: Float[np.ndarray, " rows"],
+        sizes: Float[np.ndarray, " q"],
+        variances: Float[np.ndarray, " q"],
+        fitted: "LinearErrors",
+    ) -> Float[np.ndarray, " rows"]:
+        """Return the variance of what runs have of their own that are like some fitted ones.
+
+        `sizes`, `variances`: of the errors of those, which are `fitted`.
+        """
+        at = fitted.of_runs
+        each = (sizes[at] ** 2 + variances[at]).reshape(-1, len(fitted.rows.runs))
+        columns = self.columns(predicted, np.zeros((len(predicted), 0)))[:, self.of_runs]
+        return columns**2 @ np.repeat(np.mean(each, axis=1), len(self.rows.runs))
+
     def through(
         self,
         slopes: Float[np.ndarray, "rows m"],
