@@ -93,7 +93,7 @@ def demo(
     quiet: console.QuietOption = False,
     overwrite: console.OverwriteOption = False,
 ) -> None:
-    """Run a small comparison and a closed loop on synthetic data, in about two minutes."""
+    """Run a small comparison and a closed loop on synthetic data, in about a minute."""
     from discover.batch.run import run_demo
 
     with progress_bar(quiet) as report:

@@ -125,8 +125,11 @@ def compare(
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     times.learning()
 
+    sheared = any(flow.in_shear for flow in frame.flows if flow.kind == "training")
+    of = frame.data.fit.runs, library, frame.model, options.use_normal_stresses
     with ThreadPoolExecutor(1) as beside:
-        determined = _determined_beside(beside, found, frame, study, library)
+        # at a first start its program takes as long to compile as a learner learns
+        alone = beside.submit(copy_context().run, structure_of, (), *of) if sheared else None
         own = learning.outcomes(options.learners, frame, times.learned)
     times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
@@ -162,6 +165,10 @@ def compare(
             data.dataset, study.data.material, data.dataset.name
         ),
     )  # fmt: skip
+
+    def determined(terms: Sequence[LawTerm]) -> Structure | None:
+        return None if alone is None else structure_of(terms, *of, alone.result())
+
     comparison = _with_what_is_open(comparison, found, frame, data, study, library, determined)
     progress("done", 1.0)
     return comparison
@@ -198,28 +205,9 @@ def _of_material(
     )  # fmt: skip
 
 
-_Determined = Callable[[Sequence[LawTerm]], Structure | None]
-
-
-def _determined_beside(
-    pool: ThreadPoolExecutor, found: Found, frame: Frame, study: Study, library: TermLibrary
-) -> _Determined:
-    """Return what says what the runs determine at the terms of a law; None without shear.
-
-    What they determine at the known part is computed beside what learns: at a first start its
-    program takes as long to compile as a learner learns.
-    """
-    in_shear = any(flow.in_shear for flow in frame.flows if flow.kind == "training")
-    if not in_shear or found.ended().verdict == "no_signal":
-        return lambda terms: None
-    of = frame.data.fit.runs, library, frame.model, study.compare.use_normal_stresses
-    alone = pool.submit(copy_context().run, structure_of, (), *of)
-    return lambda terms: structure_of(terms, *of, alone.result())
-
-
 def _with_what_is_open(
     comparison: Comparison, found: Found, frame: Frame, data: StudyData, study: Study,
-    library: TermLibrary, determined: _Determined,
+    library: TermLibrary, determined: Callable[[Sequence[LawTerm]], Structure | None],
 ) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
