@@ -129,7 +129,7 @@ def description(answer: Any, brief: int = 0) -> str:
     """
     if not answer.title:
         return ""
-    within = f"{'the flow curve within its' if answer.range.steady else 'within the'}"
+    within = "the flow curve within its" if answer.range.steady else "within the"
     noise = "" if answer.noise is None else percent_of(answer.noise)
     found = answer.discrepancy
     if answer.fits_to_the_noise:
@@ -170,9 +170,8 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
         told = [f"{each[0]} (worst run {worst[1]})", *each[1:]]
     elif worst is not None:
         told = [*told, f"worst run {worst[1]}"]
-    said = f"ean error on {answer.discrepancy.unseen}: {', '.join(told)}"
-    rough = f"Too rough for {percent_of(answer.tolerance)}; m"
-    return f"{rough if _is_too_rough(answer) else 'M'}{said}"
+    rough = f"Too rough for {percent_of(answer.tolerance)}; m" if _is_too_rough(answer) else "M"
+    return f"{rough}ean error on {answer.discrepancy.unseen}: {', '.join(told)}"
 
 
 def _is_too_rough(answer: Any) -> bool:
@@ -200,8 +199,8 @@ def tolerance(answer: Any, brief: int = 0) -> str:
     Empty where that was said of unseen runs, or `where` says up to which rate.
     """
     over = len(_over_tolerance(answer))
-    met_in_part = over and answer.discrepancy.met_up_to
-    if answer.adequate is None or _is_too_rough(answer) or met_in_part:
+    in_part = over and answer.discrepancy.met_up_to
+    if answer.adequate is None or _is_too_rough(answer) or in_part:
         return ""
     state = "met" if answer.adequate else "missed"
     if over and (not brief or answer.adequate):
@@ -235,10 +234,12 @@ def usable(answer: Any) -> tuple[list[str], list[str]]:
         most = _USELESS if one.is_measured else answer.tolerance
         if fitted if one.inside is None else one.inside <= most:
             symbol = "steady shear stress" if name == "sigma12" and answer.range.steady else symbol
-            apart = "" if one.is_measured else percent_of(max(one.inside, _LITTLE))
-            said = f"{symbol} is predicted (equally good laws agree within {apart})"
-            untested = f"{said}, {one.note or 'never measured'}"
-            (tested if one.is_measured else implied).append(symbol if one.is_measured else untested)
+            if one.is_measured:
+                tested.append(symbol)
+            else:
+                apart = at_most(one.inside or 0.0).removeprefix("< ")
+                by = f"is predicted (equally good laws agree within {apart})"
+                implied.append(f"{symbol} {by}, {one.note or 'never measured'}")
     tested += [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
     return tested, implied
 

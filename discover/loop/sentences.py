@@ -6,7 +6,7 @@ from typing import Any
 from discover import words
 from discover.answer import Constant
 from discover.answer.modes_in_words import reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ, flows_of
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, at_most, differ
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.fitted_range import as_measured
 from discover.loop.runs import RunRecord
@@ -84,7 +84,7 @@ def what_to_measure_next(result: Any) -> str:
         if own := suspected(result):  # of the instrument
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
         then = _of_another_stress(result) or _by_geometry(result)
-        first, what = _of_unfitted(result), _as_clause(then).partition(":")[0]
+        first, what = _of_unfitted(result), _as_clause(then).partition(": ")[0]
         return f"{first}; then {what}." if first else then
     # the stage to confirm first: one with aliases before one without
     with_aliases = [stage for stage in result.stages if stage.aliases]
@@ -113,10 +113,8 @@ def _of_sweep(result: Any) -> str:
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
             share = Constant(name, one.value, one.ci95).measured(f"{words.LEVEL} ")
-            return (
-                "Repeat the frequency sweep on this loading: "
-                f"its {OF_SWEEP[name]} are {share} times the sweep's."
-            )
+            shifted = f"its {OF_SWEEP[name]} are {share} times the sweep's"
+            return f"Repeat the frequency sweep on this loading: {shifted}."
     return ""
 
 
@@ -125,10 +123,8 @@ def _of_unfitted(result: Any) -> str:
     found = measured(result.records, "uniaxial", result.noise_floor)
     missed = (0.0 if found is None else found.inside) or 0.0
     fitted = any(r.flow == "uniaxial" and not r.held_out for r in result.records)
-    if fitted or missed <= result.tolerance:
-        return ""
-    by = words.percent_of(missed) if missed <= MUCH else f"more than {words.percent_of(MUCH)}"
-    return f"Fit {flows_of(['uniaxial'])} too, which this law misses by {by}"
+    by = f"which this law misses by {at_most(missed)}"
+    return "" if fitted or missed <= result.tolerance else f"Fit {SYMBOLS['uniaxial']} too, {by}"
 
 
 def _fastest(records: Sequence[RunRecord]) -> str:

@@ -72,10 +72,9 @@ def _fitted(answer: Answer) -> str:
     if not any(one.ci95 for one in answer.constants):
         return ""
     at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
-    used = {one: answer.shift_factors.get(one) for one in answer.range.by_temperature}
-    for one, factor in used.items():
-        if factor is not None and len(used) == 1:
-            at += f", {modes.shortened(factor)} at {modes.degrees(one)}"
+    for used, factor in answer.shift_factors.items():
+        if [*answer.range.by_temperature] == [used]:
+            at += f", × {words.significant(factor, 2)} at {modes.degrees(used)}"
     return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
 
 
