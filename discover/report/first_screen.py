@@ -74,7 +74,7 @@ def _fitted(answer: Answer) -> str:
     at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
     for used, factor in answer.shift_factors.items():
         if [*answer.range.by_temperature] == [used]:
-            at += f", × {words.significant(factor, 2)} at {modes.degrees(used)}"
+            at += f", {modes.shortened(factor)} at {modes.degrees(used)}"
     return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
 
 
