@@ -142,11 +142,12 @@ _EFFECTS = {
     "ptt_exponential": "exponential PTT",
     "rate_rise_time": "motor response time",
     "relaxation_mode": "added mode",
+    "softening_by_work": "work-softened relaxation",
     "solvent_viscosity": "Newtonian viscosity",
     # whatever takes the torque away: of a broken edge runs alone say no more
     "edge_fracture": "torque loss with strain",
     # what runs show; that it is thixotropy would take recovery at rest
-    "thixotropy": "flow softening",
+    "thixotropy": "flow-softened modulus",
     "thixotropic_modulus": "rate-softened modulus",
     "thixotropic_modulus_by_stress": "stress-softened modulus",
     "thixotropic_relaxation": "rate-softened relaxation",

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from discover.answer.sentences import SYMBOLS, at_most, worst_run
+from discover.answer.sentences import SYMBOLS, at_most, noise_of, worst_run
 from discover.words import percent_of
 
 
@@ -68,24 +68,21 @@ def errors(answer: Any) -> list[Errors]:
     if answer.falls_above:
         told = f"falls above {answer.falls_above}"
         by_law.append(Row("steady flow curve", "of this law", told, None))
-    untested = (_BY_LAW, (_INSIDE, _TWICE)) if apart else ("Untested", ("", ""))
-    blocks = Errors(_title(answer), (_INSIDE, "beyond"), measured), Errors(*untested, by_law)
+    heads = (_INSIDE, _TWICE) if apart else ("", "")
+    title = f"{_NOT_COMPARED}{'; equally good laws differ by' * apart}"
+    blocks = Errors(_title(answer), (_INSIDE, "beyond"), measured), Errors(title, heads, by_law)
     return [one for one in blocks if one.rows]
 
 
 _INSIDE = "in\N{NO-BREAK SPACE}range"
-_BY_LAW, _TWICE = "Untested; equally good laws differ by", "at twice the highest rate"
+_NOT_COMPARED, _TWICE = "Not compared with data", "at twice the highest rate"
 
 
 def _title(answer: Any) -> str:
     """Return what the errors are, and the noise that they do not hold."""
     of = "Residual of the fitted" if answer.expected("sigma12").is_residual else "Error on unseen"
-    noise = f" besides {_noise(answer)} of {percent_of(answer.noise)}" if answer.noise else ""
+    noise = f" besides {noise_of(answer)} of {percent_of(answer.noise)}" if answer.noise else ""
     return f"{of} runs{noise}"
-
-
-def _noise(answer: Any) -> str:
-    return "scatter" if answer.range.steady else "noise"
 
 
 def _note(answer: Any, one: Any) -> str:
@@ -97,6 +94,6 @@ def _note(answer: Any, one: Any) -> str:
 def _inside(answer: Any, one: Any) -> str:
     """Return the error in the range; of what the verdict calls noise, that it is."""
     if one.inside is None:
-        return "no data"
+        return "not measured"
     is_noise = not one.inside or (one.is_residual and answer.fits_to_the_noise)
-    return f"within {_noise(answer)}" if is_noise else at_most(one.inside)
+    return f"within {noise_of(answer)}" if is_noise else at_most(one.inside)

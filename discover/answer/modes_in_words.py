@@ -99,6 +99,12 @@ def table(answer: Any) -> tuple[list[str], list[list[str]]]:
     return ["mode", "G (Pa)", "λ (s)", *(one.symbol for one in each)], rows
 
 
+def of_which_added(answer: Any) -> str:
+    """Return how many modes were declared and how many added, in brackets; empty without these."""
+    added = sum(is_added(answer, one) for one in answer.modes)
+    return f" ({len(answer.modes) - added} declared, {added} added)" if added else ""
+
+
 def is_added(answer: Any, mode: Any) -> bool:
     """Return whether a mode was added to those that were declared."""
     added = (one.value for one in answer.constants if one.letter.startswith("G_+"))

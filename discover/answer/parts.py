@@ -111,7 +111,7 @@ class ExpectedError:
     inside: float | None = None
     beyond: float | None = None
     beyond_at: str = ""
-    missing: Literal["no data", "not determined"] = "no data"
+    missing: Literal["not measured", "not determined", "measured but not used"] = "not measured"
     note: str = ""
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
     is_residual: bool = False  # of fitted runs, which is no error to expect

@@ -9,7 +9,7 @@ from discover.words import LEVEL, counted, effect_title, listed, percent_of, sig
 _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
 # many), and how brief `description` is
-_SHORTER = ((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3), (-1, 3), (-1, 4))
+_SHORTER = ((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (-1, 2), (-1, 3), (-1, 4))
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -72,9 +72,7 @@ def _law(answer: Any, most: int) -> str:
     if several:
         # a solvent, or modes faster than the data: a melt has the one and no other
         and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
-        added = sum(modes.is_added(answer, one) for one in answer.modes)
-        count = f"{len(answer.modes) - added}{f'+{added}' * bool(added)} modes"
-        named.append(count + " and η_s" * bool(and_viscosity))
+        named.append(f"{len(answer.modes)} modes{' and η_s' * bool(and_viscosity)}")
     elif answer.modes and not several and not own and not modes.is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
@@ -131,28 +129,33 @@ def description(answer: Any, brief: int = 0) -> str:
     """
     if not answer.title:
         return ""
-    scatter = "the flow curve within its scatter" if answer.range.steady else "within the noise"
+    within = "the flow curve within its" if answer.range.steady else "within the"
     noise = "" if answer.noise is None else percent_of(answer.noise)
     found = answer.discrepancy
     if answer.fits_to_the_noise:
-        said = f"Fits {scatter}{f' of {noise}' if noise else ''}"
+        said = f"Fits {within} {noise_of(answer)}{f' of {noise}' if noise else ''}"
     elif found is None or not found.size:
         said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-        ends = f" ({_LEVEL}{low}–{high} %)" if low != high and brief < 3 else ""
-        size = f"{percent_of(found.size)}{ends}"
+        ends = "new runs may average " if _is_too_rough(answer) else f"{_LEVEL}{low}–"
+        size = f"{percent_of(found.size)}{f' ({ends}{high} %)' * (low != high and brief < 3)}"
         # of fitted runs it is no error that a prediction could have
         said = _of_unseen(answer, size, brief) if found.unseen else _OF_FITTED + size
     parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
     return f"{'; '.join(filter(None, parts))}." if said else ""
 
 
+def noise_of(answer: Any) -> str:
+    """Return what noise is called: of a flow curve scatter, for nothing else measures it."""
+    return "scatter" if answer.range.steady else "noise"
+
+
 _OF_FITTED = "Residual of the fitted runs "
 
 
 def _of_unseen(answer: Any, size: str, brief: int) -> str:
-    """Return the errors of unseen runs: of each quantity where several were measured, else of all.
+    """Return mean errors of unseen runs: of each quantity where several were measured, or of all.
 
     And the worst of these, where one misses the tolerance and the range does not say it.
     """
@@ -167,7 +170,14 @@ def _of_unseen(answer: Any, size: str, brief: int) -> str:
         told = [f"{each[0]} (worst run {worst[1]})", *each[1:]]
     elif worst is not None:
         told = [*told, f"worst run {worst[1]}"]
-    return f"Error on {answer.discrepancy.unseen}: {', '.join(told)}"
+    rough = f"Too rough for {percent_of(answer.tolerance)}; m" if _is_too_rough(answer) else "M"
+    return f"{rough}ean error on {answer.discrepancy.unseen}: {', '.join(told)}"
+
+
+def _is_too_rough(answer: Any) -> bool:
+    """Return whether unseen runs miss the tolerance in the mean, and at each rate."""
+    found = answer.discrepancy
+    return bool(answer.adequate is False and found and found.unseen and not found.met_up_to)
 
 
 def _corrected(answer: Any, brief: int) -> str:
@@ -186,10 +196,11 @@ _MOST_SUSPECTS = 2
 def tolerance(answer: Any, brief: int = 0) -> str:
     """Return whether the tolerance is met, unless `brief` in how many runs.
 
-    Empty where `where` says up to which rate.
+    Empty where that was said of unseen runs, or `where` says up to which rate.
     """
     over = len(_over_tolerance(answer))
-    if answer.adequate is None or (over and answer.discrepancy.met_up_to):
+    in_part = over and answer.discrepancy.met_up_to
+    if answer.adequate is None or _is_too_rough(answer) or in_part:
         return ""
     state = "met" if answer.adequate else "missed"
     if over and (not brief or answer.adequate):
@@ -223,7 +234,12 @@ def usable(answer: Any) -> tuple[list[str], list[str]]:
         most = _USELESS if one.is_measured else answer.tolerance
         if fitted if one.inside is None else one.inside <= most:
             symbol = "steady shear stress" if name == "sigma12" and answer.range.steady else symbol
-            (tested if one.is_measured else implied).append(symbol)
+            if one.is_measured:
+                tested.append(symbol)
+            else:
+                apart = at_most(one.inside or 0.0).removeprefix("< ")
+                by = f"is predicted (equally good laws agree within {apart})"
+                implied.append(f"{symbol} {by}, {one.note or 'never measured'}")
     tested += [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
     return tested, implied
 
@@ -236,22 +252,11 @@ def where(answer: Any) -> str:
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     only = " only" * (len(quantities) == 1 and not implied)
-    mean = "" if answer.adequate is not False else percent_of(answer.size)
-    _, least = worst_run(answer) or ("", mean)
-    enough = _suffices(answer) or least
-    use, ends = f"Where {enough} suffices, use" if enough else "Use", ""
-    if least and (met := answer.discrepancy and answer.discrepancy.met_up_to):
-        use, ends = "Use", f": within {percent_of(answer.tolerance)} up to {met}, {least} above"
-    more = f" ({listed(implied)}: predicted, not tested)" if implied else ""
-    return f"{use} for {listed(quantities)}{only}{more}, {place}{ends}."
-
-
-def _suffices(answer: Any) -> str:
-    """Return the error that a use must allow for: of the worst run, or the end of its interval."""
-    over, found = _over_tolerance(answer), answer.discrepancy
-    if not over or found is None:
-        return ""
-    return percent_of(max([*over.values(), *(found.ci95 or ())]))
+    use, ends = "Otherwise use" if _is_too_rough(answer) else "Use", ""
+    met, worst = answer.discrepancy and answer.discrepancy.met_up_to, worst_run(answer)
+    if met and worst is not None:
+        ends = f": within {percent_of(answer.tolerance)} up to {met}, {worst[1]} above"
+    return f"{'; '.join([f'{use} for {listed(quantities)}{only}, {place}{ends}', *implied])}."
 
 
 def _place(answer: Any) -> str:

@@ -19,12 +19,11 @@ from discover.equations.formats.rheotool import DENSITY
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.loop import by_quantity
-from discover.loop.fitted_range import range_of
+from discover.loop.fitted_range import as_measured, range_of
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.runs import RunRecord
 from discover.loop.sentences import (
     EXPLAINED,
-    as_measured,
     suspected,
     untested_by,
     what_to_measure_next,

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
-from discover.loop.fitted_range import by_temperature
+from discover.loop.fitted_range import as_measured, by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.words import counted, listed, percent_of, significant
@@ -124,19 +124,22 @@ def _by_law(result: Any, kind: str) -> ExpectedError:
     """
     apart, limit = differing(result, kind), _WORTH_SAYING if kind == "N2" else _APART
     ends = _spread(result, kind)
+    recorded = kind == "N1" and any(record.has_normal_stress for record in result.records)
+    unused = "measured but not used" if recorded else None
     if kind == "N1" and normal_stress_settled(result):
-        recorded = any(record.has_normal_stress for record in result.records)
-        note = "recorded, not fitted" if recorded else ""
-        return ExpectedError(*ends, note=note, is_measured=False, spread=ends)
+        return ExpectedError(*ends, note=unused or "", is_measured=False, spread=ends)
     if apart is not None and (apart >= limit or kind == "N1"):
-        above = f", {'of N1, ' * (kind == 'N2')}limit {percent_of(limit)}" * (apart >= limit)
+        above = f"{'of N1, ' * (kind == 'N2')}limit {percent_of(limit)}" * (apart >= limit)
         missing = "not determined"
-        return ExpectedError(missing=missing, note=f"{missing}{above}", spread=ends)
-    ratio = None if kind != "N2" or ends[0] is None else result.spread_of_laws[kind].over_n1
-    if ratio is not None:
-        share = "0" if abs(ratio) < _NOTHING else f"N2/N1 ≈ {significant(ratio, 2)}"
-        return ExpectedError(note=f"{share} by this law")
-    return ExpectedError(spread=ends if apart and apart > _WORTH_SAYING else (None, None))
+        note = ", ".join(filter(None, [missing, above, unused]))
+        return ExpectedError(missing=missing, note=note, spread=ends)
+    found = result.spread_of_laws.get("N2") if kind == "N2" and ends[0] is not None else None
+    if found is not None and found.over_n1 is not None:
+        at = as_measured([r for r in result.records if not r.held_out], found.over_n1_rate)
+        share = f"N2/N1 ≈ {significant(found.over_n1, 2)} at {at}"
+        return ExpectedError(note=f"{'0' if abs(found.over_n1) < _NOTHING else share} by this law")
+    spread = ends if apart and apart > _WORTH_SAYING else (None, None)
+    return ExpectedError(missing=unused or "not measured", spread=spread)
 
 
 _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves

@@ -34,8 +34,9 @@ class Spread:
     """Root-mean-square difference between laws that describe the runs as well.
 
     `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
-    fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1
-    inside, by their rms, with the sign of N2/N1; None of other quantities. `stress`: the quantity
+    fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1,
+    by their rms, with the sign of N2/N1; None of other quantities. The largest in flows inside, of
+    which `over_n1_rate` in 1/s is the rate. `stress`: the quantity
     itself by the reported law, rms in Pa of the fastest flow inside; None where it diverges.
     `falls_above`: of σ12, see `falls_above`.
     """
@@ -45,6 +46,7 @@ class Spread:
     over_n1: float | None = None
     stress: float | None = None
     falls_above: float | None = None
+    over_n1_rate: float | None = None
 
 
 @in_one_thread
@@ -92,7 +94,8 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             if place == "inside":
                 stress[kind] = rms(found[0])
             if kind == "N2" and place == "inside":
-                ratios.append(float(np.copysign(rms(found[0]), found[0] @ of_n1[0])) / size)
+                over = float(np.copysign(rms(found[0]), found[0] @ of_n1[0])) / size
+                ratios.append((over, float(np.max(np.abs(inside[i // len(_SHEAR)].rate)))))
             squares = np.mean((found[1:] - found[0]) ** 2, axis=1)
         sound = np.isfinite(squares)
         share = np.array(weights) * sound
@@ -102,7 +105,8 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             square = float(share[sound] @ squares[sound]) / float(np.sum(share))
             value = float(np.sqrt(square)) / size
         own.setdefault(kind, {}).setdefault(place, []).append(value)
-    ratio = max(ratios, key=abs) if np.all(np.isfinite(ratios)) else None
+    known = bool(np.all(np.isfinite(ratios)))
+    ratio, at = max(ratios, key=lambda one: abs(one[0])) if known else (None, None)
     return {
         kind: Spread(
             _largest(of["inside"]),
@@ -110,6 +114,7 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             ratio if kind == "N2" else None,
             _largest([stress[kind]]),
             falls_above(model, best.theta, rates) if kind == "sigma12" else None,
+            at if kind == "N2" else None,
         )
         for kind, of in own.items()
     }

@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from discover.answer import Range
+from discover.answer.modes_in_words import degrees
 from discover.equations import Equation
 from discover.equations.equation import flow_numbers
 from discover.loop.runs import RunRecord
+from discover.words import significant
 
 # Share of the largest rate that a flow reaches in the other direction, if it oscillates
 _TURNS = 0.5
@@ -31,6 +33,15 @@ def by_temperature(records: Sequence[RunRecord]) -> dict[float, list[RunRecord]]
         found.setdefault(at, []).append(record.unshifted)
     shifted = any(record.shift != 1.0 for record in records)
     return dict(sorted(found.items(), reverse=True)) if shifted else {}
+
+
+def as_measured(records: Sequence[RunRecord], rate: float | None = None) -> str:
+    """Return a rate, by default its own, as the fastest run has it at its temperature."""
+    fastest = max(records, key=lambda record: record.fastest)
+    share = 1.0 if rate is None else rate / fastest.fastest
+    at = fastest.temperature_C
+    place = "" if fastest.shift == 1.0 or at is None else f" and {degrees(at)}"
+    return f"{significant(share * fastest.unshifted.fastest, 2)} 1/s{place}"
 
 
 def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> Range:

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from discover import words
-from discover.answer.modes_in_words import degrees, reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, differ
+from discover.answer import Constant
+from discover.answer.modes_in_words import reduced_to
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, at_most, differ
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
+from discover.loop.fitted_range import as_measured
 from discover.loop.runs import RunRecord
 
 MOST_NAMES = 3
@@ -84,7 +86,9 @@ def what_to_measure_next(result: Any) -> str:
             return told
         if own := suspected(result):  # of the instrument
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
-        return _of_another_stress(result) or _by_geometry(result)
+        then = _of_another_stress(result) or _by_geometry(result)
+        first, what = _of_unfitted(result), _as_clause(then).partition(": ")[0]
+        return f"{first}; then {what}." if first else then
     # the stage to confirm first: one with aliases before one without
     with_aliases = [stage for stage in result.stages if stage.aliases]
     doubtful = next(iter([*with_aliases, *result.stages]), None)
@@ -109,24 +113,26 @@ _CHECKS = {
 
 def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
-    fitted = [one for name, one in result.declared_parameters.items() if name in OF_SWEEP]
-    if not any(differ(one.ci95, result.tolerance) for one in fitted if not one.is_open):
-        return ""
-    return "Repeat the frequency sweep on the same loaded sample: these runs have other moduli."
+    for name, one in result.declared_parameters.items():
+        if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
+            share = Constant(name, one.value, one.ci95).measured(f"{words.LEVEL} ")
+            shifted = f"its {OF_SWEEP[name]} are {share} times the sweep's"
+            return f"Repeat the frequency sweep on this loading: {shifted}."
+    return ""
+
+
+def _of_unfitted(result: Any) -> str:
+    """Return what was measured in another flow, not fitted and missed; empty where nothing."""
+    found = measured(result.records, "uniaxial", result.noise_floor)
+    missed = (0.0 if found is None else found.inside) or 0.0
+    fitted = any(r.flow == "uniaxial" and not r.held_out for r in result.records)
+    by = f"which this law misses by {at_most(missed)}"
+    return "" if fitted or missed <= result.tolerance else f"Fit {SYMBOLS['uniaxial']} too, {by}"
 
 
 def _fastest(records: Sequence[RunRecord]) -> str:
     """Return the rate of the fastest run as it was measured, with its temperature if shifted."""
     return as_measured(records) if records else "that of the fastest run"
-
-
-def as_measured(records: Sequence[RunRecord], rate: float | None = None) -> str:
-    """Return a rate, by default its own, as the fastest run has it at its temperature."""
-    fastest = max(records, key=lambda record: record.fastest)
-    share = 1.0 if rate is None else rate / fastest.fastest
-    at = fastest.temperature_C
-    place = "" if fastest.shift == 1.0 or at is None else f" and {degrees(at)}"
-    return f"{words.significant(share * fastest.unshifted.fastest, 2)} 1/s{place}"
 
 
 def _as_clause(check: str) -> str:

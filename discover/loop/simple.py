@@ -95,7 +95,7 @@ def check_of(material: SimpleMaterial) -> str:
     first, *_ = material.constants
     low, high = first.ci95 or (first.value, first.value)
     below, above = (significant(end, 2) for end in (_BELOW * low, high / _BELOW))
-    return f"Creep at {below} Pa and {above} Pa: it should flow at {above} Pa alone."
+    return f"Creep at {below} Pa and {above} Pa: it should flow only at {above} Pa."
 
 
 _BELOW = 0.9  # Stress of a creep over the yield stress, far enough from it to be told in an hour

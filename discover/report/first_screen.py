@@ -72,15 +72,17 @@ def _fitted(answer: Answer) -> str:
     if not any(one.ci95 for one in answer.constants):
         return ""
     at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
+    for used, factor in answer.shift_factors.items():
+        if [*answer.range.by_temperature] == [used]:
+            at += f", {modes.shortened(factor)} at {modes.degrees(used)}"
     return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
 
 
 def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is possible."""
-    poor = sentences.POORLY * (one.determined and one.is_poor)
     end = "at its physical limit" * one.at_limit
-    width = "may be infinite, without effect" if one.may_be_absent else poor
-    return "; ".join(filter(None, [one.said, end, width]))
+    absent = "may be infinite, without effect" * one.may_be_absent
+    return "; ".join(filter(None, [one.said, end, sentences.POORLY * one.is_poor, absent]))
 
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from discover.answer.sentences import noise_of
 from discover.laws.registry import LAWS
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
@@ -75,6 +76,7 @@ def write_loop(
         screen=answer_screen(result.answer),
         sentences=loop_verdict(result),
         error_rows=error_rows(result),
+        noise=noise_of(result.answer),
         noise_range=noise_range(result),
         inclusion=inclusion(result),
         kinds=KINDS,
@@ -145,11 +147,11 @@ def what_was_found(result: LoopResult) -> str:
         )
         return f"{_LOOP['no_signal']}: {why}."
     parts = []
-    if result.verdict == "unexplained" and result.free_form:
-        parts.append(free_form_sentence(result.free_form[0]))
     if result.laws:
         parts.append(_law_chosen(result.laws))
     stands = _LOOP[result.verdict] if doubted(result) is None else _OPEN
+    if result.verdict == "unexplained" and result.free_form:
+        stands = free_form_sentence(result.free_form[0])
     if untested := untested_by(result):
         stands = f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
     return sentence([stands, *parts])

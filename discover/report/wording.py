@@ -102,7 +102,7 @@ def parameter_name(name: str, parameter: StageParameter) -> str:
 
 
 _WHAT = {
-    "recorded_stress": "a function of the recorded stress alone",
+    "recorded_stress": "a record that is a function of the stress alone",
     "drift": "a function of the time alone",
     "response": "a transducer that answers late, by a function of the lag alone",
     "rate": "a function of the shear rate alone",
@@ -129,11 +129,13 @@ def _with_constants(found: FreeForm) -> Callable[[str], str]:
 
 
 def free_form_sentence(found: FreeForm) -> str:
-    """Return what a free function is and where it stands, without a full stop."""
-    effects = " and ".join(map(_with_constants(found), found.beside)) or "your model"
-    shape = f", close to the {found.nearest} form" if found.nearest else ", close to no known form"
+    """Return beside what a free function explains the runs, and what it is; no full stop."""
+    told = words.effect_title if found.in_answer else _with_constants(found)  # the answer has them
+    effects = " and ".join(map(told, found.beside)) or "your model"
+    shape = f"close to the {found.nearest} form" if found.nearest else "close to no known form"
     what = _WHAT[found.slot].format(variable=found.variable)
-    return f"{what}{shape}, with {effects} explains the residual"
+    left = "leaves noise" if found.in_answer else "explains the residual"
+    return f"{effects} with {what} ({shape}) {left}; that function has no name here"
 
 
 _TOGETHER = re.compile(

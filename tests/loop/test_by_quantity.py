@@ -133,14 +133,19 @@ def test_each_quantity_has_the_error_of_its_own_unseen_runs():
 
 
 def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
-    close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09)}
+    close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09, over_n1_rate=0.1)}
     told = errors_by_quantity(result(FITTED, 0.005, spread_of_laws=close))
     assert (told["N1"].note, told["N1"].spread) == ("", (0.01, 0.02))
     recorded = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
     found = result(recorded, spread_of_laws=close)
-    assert errors_by_quantity(found)["N1"].note == "recorded, not fitted"
-    assert told["N2"].note == "N2/N1 ≈ −0.09 by this law"
-    assert told["N2"].missing == "no data"
+    assert errors_by_quantity(found)["N1"].note == "measured but not used"
+    found.spread_of_laws = {}
+    assert errors_by_quantity(found)["N1"].missing == "measured but not used"
+    found.spread_of_laws = {"N1": Spread(0.6, 0.8)}
+    unsure = errors_by_quantity(found)["N1"].note
+    assert unsure == "not determined, limit 20 %, measured but not used"
+    assert told["N2"].note == "N2/N1 ≈ −0.09 at 0.1 1/s by this law"
+    assert told["N2"].missing == "not measured"
     assert not told["N2"].is_known
     affine = {**close, "N2": Spread(0.0, 0.0, 1e-9)}  # but for the integrator
     assert errors_by_quantity(result(FITTED, spread_of_laws=affine))["N2"].note == "0 by this law"
@@ -186,15 +191,20 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
 
 def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
     factor = StageParameter(0.52, (0.04, 0.79), "1")
-    again = "Repeat the frequency sweep on the same loaded sample: these runs have other moduli."
-    for name in ("modulus_factor", "relaxation_time_factor"):
-        assert what_to_measure_next(close(declared_parameters={name: factor})) == again
+    again = "Repeat the frequency sweep on this loading: its "
+    for name, what in (
+        ("modulus_factor", "moduli"),
+        ("relaxation_time_factor", "relaxation times"),
+    ):
+        assert what_to_measure_next(close(declared_parameters={name: factor})) == (
+            f"{again}{what} are 0.52 (95 % CI 0.04–0.79) times the sweep's."
+        )
     # the first is next to one, within the tolerance of 10 %, and the last is no value
     for ends in ((0.5, 0.92), (0.4, 1.1), (0.001, 60.0)):
         same = close(declared_parameters={"modulus_factor": replace(factor, ci95=ends)})
-        assert what_to_measure_next(same) != again
+        assert not what_to_measure_next(same).startswith(again)
     alone = close(declared_parameters={"modulus_Pa": replace(factor, value=0.5)})
-    assert what_to_measure_next(alone) != again  # there is no sweep
+    assert not what_to_measure_next(alone).startswith(again)  # there is no sweep
 
 
 def close(records=FITTED, **more):
@@ -272,12 +282,17 @@ def test_a_tolerance_is_met_up_to_the_rate_below_the_slowest_run_that_misses_it(
     assert not with_unseen(result([*FITTED, pulled], left_out=left)).met_up_to
 
 
-def test_what_was_measured_and_not_fitted_says_so_and_is_not_measured_next():
+def test_what_was_measured_and_missed_but_not_fitted_is_fitted_next():
     held = record("pulled", 0.3, 0.5, held_out=True, quantity="tensile_stress")
     found = close([*FITTED, replace(held, flow="uniaxial")])
     assert errors_by_quantity(found)["uniaxial"].note == "1 run at 0.3 1/s, not fitted"
     told = what_to_measure_next(found)
-    assert told == "Measure N1 at 1 1/s: equally good laws differ by 60 %."
+    missed = "Fit uniaxial extension too, which this law misses by 50 %"
+    assert told == f"{missed}; then measure N1 at 1 1/s."
+    found.tolerance = 0.55
+    assert what_to_measure_next(found).startswith("Measure N1")
+    both = replace(held, flow="uniaxial", held_out=False)
+    assert not what_to_measure_next(close([*FITTED, both])).startswith("Fit")
 
 
 @pytest.mark.parametrize("alpha", [0.49, 0.7])

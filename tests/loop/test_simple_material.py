@@ -86,7 +86,7 @@ def test_a_yield_stress_is_tested_by_creep_at_stresses_below_and_above_its_inter
     ends = (11.0, 13.0), (2.0, 4.0), (0.4, 0.6)
     fluid = material_of(SimpleFit("herschel_bulkley", (12.0, 3.0, 0.5), ends, 0.01, 5.0))
     # a tenth below the one end and above the other, in two digits
-    assert check_of(fluid) == "Creep at 9.9 Pa and 14 Pa: it should flow at 14 Pa alone."
+    assert check_of(fluid) == "Creep at 9.9 Pa and 14 Pa: it should flow only at 14 Pa."
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 0.9])

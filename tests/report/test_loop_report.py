@@ -9,7 +9,7 @@ import pytest
 from standing_alone import stands_alone
 
 from discover.effects import make_effect
-from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stage
+from discover.loop import CandidateScore, ErrorPair, FreeForm, LoopResult, RunRecord, Stage
 from discover.loop.parts import (
     ConstantByMode,
     Explanation,
@@ -205,6 +205,34 @@ def test_where_no_law_is_given_no_model_and_no_band_is_drawn():
         for said in ("starting model", "95 % prediction band", "1 %"):
             assert (said in picture.svg) is drawn
         assert ("predicted" in picture.caption) is drawn
+
+
+def test_a_page_without_a_signal_has_no_section_on_laws(tmp_path, no_pictures):
+    for verdict, told in (("effects_added", True), ("no_signal", False)):
+        result = replace(loop_result(), verdict=verdict)
+        page = write_loop(result, RunFolder(tmp_path, "x", True), "n", "d").read_text("utf-8")
+        for section in ("before-after", "explanations", "effects", "ranking-table", "remaining"):
+            assert (f'href="#{section}"' in page) is told
+            assert (f'<h2 id="{section}"' in page) is told
+        assert '<h2 id="run-table"' in page
+
+
+def test_a_function_that_is_in_the_answer_is_told_beside_its_law():
+    curve = np.zeros(2)
+    found = FreeForm(
+        "recorded_stress", "stress", "Pa", ("ptt_exponential",), curve, curve, curve, curve,
+        "clipped", {"ptt_exponential": {"epsilon": (0.364, 0.346, 0.381)}}, in_answer=True,
+    )  # fmt: skip
+    unexplained = replace(loop_result(), verdict="unexplained", free_form=(found,))
+    assert loop_verdict(unexplained)[0] == (
+        "Exponential PTT with a record that is a function of the stress alone (close to the "
+        "clipped form) leaves noise; that function has no name here."
+    )
+    # one beside which other laws are as likely leaves no noise for sure
+    other = replace(unexplained, free_form=(replace(found, in_answer=False, nearest=None),))
+    said = loop_verdict(other)[0]
+    assert "(ε = 0.364, 95 % CI 0.346 to 0.381) with a record" in said
+    assert "(close to no known form) explains the residual" in said
 
 
 def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():
