@@ -148,7 +148,7 @@ def _bands(
     values = predicted.reshape(len(parts), each, *predicted.shape[1:])
     apart = np.zeros((len(parts), *predicted.shape[1:3]))
     reading = _Reading(found, rows)
-    for part, own, variance, (_, _, linear) in zip(parts, values, apart, drawn, strict=True):
+    for at, (part, own, (_, _, linear)) in enumerate(zip(parts, values, drawn, strict=True)):
         fitter = found.posterior.fitter_of(part.fit)
         if isinstance(fitter, WithFunction):
             function = fitter.variable.at(rows)
@@ -156,7 +156,7 @@ def _bands(
                 _add(function, sizes, stresses, rows, as_recorded)
         if as_recorded:
             with np.errstate(all="ignore"):  # a law that diverges
-                variance[rows.seen] = reading.variance(own[0, rows.seen, 0], part.fit)
+                apart[at, rows.seen] = reading.variance(own[0, rows.seen, 0], part.fit)
                 own[:, rows.seen, 0] = reading.recorded(own[:, rows.seen, 0], linear)
     largest = float(np.max(np.abs(problem.fitted.recorded)))
     for i, run in enumerate(runs):

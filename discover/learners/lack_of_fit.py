@@ -121,5 +121,5 @@ def lack_of_fit(
         size = float(np.mean(noise_beside(by_run, fit.noise.sizes))) if noise is None else noise
         return LackOfFit("unexplained", misfit, size, *beside)
     verdict: FitVerdict = "explained" if misfit <= ONLY_NOISE else "no_signal"
-    known = noise is not None and misfit <= STATED_TOO_SMALL * noise
-    return LackOfFit(verdict, misfit, noise if known else misfit, *beside)
+    stated_well = noise is not None and misfit <= STATED_TOO_SMALL * noise
+    return LackOfFit(verdict, misfit, noise if noise and stated_well else misfit, *beside)
