@@ -17,6 +17,7 @@ from discover.effects.registry import parameters_of
 from discover.equations import AugmentedLaw, Equation, law_parts
 from discover.equations.formats.rheotool import DENSITY
 from discover.errors import InputError
+from discover.inference.engine.free_form import FreeForm
 from discover.laws.registry import LAWS
 from discover.loop import by_quantity
 from discover.loop.fitted_range import as_measured, range_of
@@ -80,7 +81,7 @@ def loop_answer(result: Any) -> Answer:
         by_quantity.errors_by_quantity(result),
         following,
         (
-            *(Suspect(one.title) for one in result.free_form if one.in_answer),
+            *(_of_function(one) for one in result.free_form if one.in_answer),
             *(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         ),
         failed=_failed(result),
@@ -310,6 +311,18 @@ def _law_first(values: Mapping[str, ByMode], found: Sequence[Constant]) -> list[
             one = replace(one, value=float(np.mean(of_modes)), by_mode=each)
         own.append(one)
     return [*own, *left]
+
+
+def _of_function(found: FreeForm) -> Suspect:
+    """Return a function of the measurement; of the stress, what it takes of that at most."""
+    at = int(np.argmax(np.abs(found.value)))
+    if found.slot != "recorded_stress" or not found.grid[at]:
+        return Suspect(found.title)
+    share, low, high = (
+        float(one[at] / found.grid[at]) for one in (found.value, found.low95, found.high95)
+    )
+    where = f"at {significant(float(found.grid[at]), 2)} {found.unit}"
+    return Suspect(found.title, (Constant("reading", share, (low, high), meaning=where),))
 
 
 def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
