@@ -20,7 +20,7 @@ from discover.inference.engine.rows import Rows
 from discover.inference.engine.variables import SLIP_CURVE, Variable
 from discover.inference.engine.with_function import WithFunction
 from discover.linear_algebra_threads import in_one_thread
-from discover.loop.expected_errors import misfit, weighed_laws
+from discover.loop.expected_errors import SIMPLE_FLUIDS, misfit, weighed_laws
 from discover.loop.loop import Found
 from discover.statistics.noise.noise_model import rms
 
@@ -35,10 +35,6 @@ _RUNS_AWAY = 1e3
 
 _LOST = 0.5
 """Weight of hypotheses that may diverge in a flow in which the others still make a band."""
-
-_RATIO = -2.0 / 7.0
-"""Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
-at small strain with independent alignment; measured ratios lie between that and zero]."""
 
 _POWERS = np.array([1.0, 2.0, 2.0])
 """Powers of the shear stress with which σ12, N1 and N2 go   [second-order fluid: Bird, Armstrong &
@@ -265,15 +261,17 @@ def _band(
         off = own[1:][fine[1:]] - main
         variance = np.mean(off**2, axis=0) if len(off) else np.zeros_like(main)
         variance[:, 0] += more
-        size = np.sqrt(np.mean(main**2, axis=0))[[0, 1, 1]] * [1.0, 1.0, -_RATIO]
+        size = np.sqrt(np.mean(main**2, axis=0))[[0, 1, 1]] * [1.0, 1.0, -SIMPLE_FLUIDS]
         if part.is_none:
             missed, (share, least) = _missed(found, part.fit, run), _UNRELATED
             off = (missed * _POWERS) ** 2 + np.maximum(missed * share, least) ** 2
             variance = variance + off * size**2
+        problem = found.posterior.problem
+        if part.is_none or problem.leaves_second_difference_open(part.fit.names):
             prior = main.copy()
-            prior[:, 2] = 0.5 * _RATIO * main[:, 1]
+            prior[:, 2] = 0.5 * SIMPLE_FLUIDS * main[:, 1]
             wide = variance.copy()
-            wide[:, 2] += (_RATIO * main[:, 1]) ** 2 / 12.0
+            wide[:, 2] += (SIMPLE_FLUIDS * main[:, 1]) ** 2 / 12.0
             for middle, own_variance in ((main, variance), (prior, wide)):
                 weights.append(0.5 * part.weight)
                 middles.append(middle)

@@ -118,6 +118,8 @@ class ConstitutiveEffect(AbstractEffect):
 
     explicit_rate: bool = False
     kind: ClassVar[Kind] = "constitutive"
+    leaves_second_difference_open: ClassVar[bool] = False
+    """Whether laws of the field that it stands for have one σ12 and N1, and differ in N2."""
 
     @property
     def adds_term(self) -> bool:

@@ -180,6 +180,9 @@ class StrainDamping(ConstitutiveEffect):
     489].
     """
 
+    # Finger's and Cauchy's tensor in any proportion have one σ12 and N1   [Wagner & Demarmels 1990]
+    leaves_second_difference_open = True
+
     def extra_term(self, values, stress, rate):
         size = jnp.sqrt(jnp.maximum(0.5 * inner(rate, rate), _AT_REST))
         return values[0] * size * (stress + identity_like(stress))

@@ -26,6 +26,10 @@ _STRAIN, _HENCKY = 20.0, 3.0
 _LEAST_LIKELY = 0.01  # Of the likeliest law, below which one changes nothing
 _SEED = 20261128
 
+SIMPLE_FLUIDS = -2.0 / 7.0
+"""Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
+at small strain with independent alignment; measured ratios lie between that and zero]."""
+
 _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
 
 
@@ -104,6 +108,8 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
         else:
             square = float(share[sound] @ squares[sound]) / float(np.sum(share))
             value = float(np.sqrt(square)) / size
+            if kind == "N2" and posterior.problem.leaves_second_difference_open(best.names):
+                value = max(value, abs(SIMPLE_FLUIDS) / 12.0**0.5)  # anything from that to zero
         own.setdefault(kind, {}).setdefault(place, []).append(value)
     known = bool(np.all(np.isfinite(ratios)))
     ratio, at = max(ratios, key=lambda one: abs(one[0])) if known else (None, None)

@@ -281,6 +281,12 @@ class Problem:
         """Return the log prior of a set: one effect of all is expected."""
         return float(sum(self.log_odds_of(self.odds(name)) for name in names))
 
+    def leaves_second_difference_open(self, names: Sequence[str]) -> bool:
+        """Return whether a hypothesis, with what is declared, says nothing of N2."""
+        known = (one.effect for one in self.declared.effects)
+        some = (*known, *(self.effects[name] for name in names))
+        return any(getattr(one, "leaves_second_difference_open", False) for one in some)
+
     def log_odds_of(self, odds: float) -> float:
         """Return the log prior of one thing more, of its odds over those of an effect by name."""
         return float(np.log(odds / self._odds))
