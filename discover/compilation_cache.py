@@ -72,6 +72,8 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     with suppress(OSError):
         remove_cut_short(folder)
     jax.config.update("jax_compilation_cache_dir", str(folder))
+    # one that another process is about to write is compiled anew, which nobody needs to know
+    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
     # small ones too: some thirty of a comparison together take a second of each start
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     return folder

@@ -299,7 +299,7 @@ def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
             return 1.0 / max(float(np.median(np.abs(run.rate))), SLOWEST_RATE)
         return 0.1 * float(run.time[-1])
 
-    time = float(np.median([slowest(run) for run in runs]))
+    time = float(np.median([slowest(run) for run in runs] or [1.0]))
     stressed = [(run, np.max(np.abs(run.stress))) for run in runs if np.any(run.stress)]
     rates = [(stress, np.max(np.abs(run.rate))) for run, stress in stressed]
     viscosities = [stress / rate for stress, rate in rates if rate > SLOWEST_RATE]
