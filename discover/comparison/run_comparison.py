@@ -37,7 +37,6 @@ from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
 from discover.loop.search_time import ComparisonTime
-from discover.loop.simple import simple_result
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data
@@ -118,7 +117,7 @@ def compare(
     times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
-    simple = simple_result(found.task, found.posterior) if made is None else None
+    simple = found.material() if made is None else None
     if simple is not None:
         progress("done", 1.0)
         return _of_material(simple, study, data, declared, learning.seed)

@@ -79,7 +79,7 @@ def run_loop(
         progress, loading,
     )  # fmt: skip
     found = search(task, laws)
-    result = simple_result(task, found.posterior) if max_effects else None
+    result = found.material() if max_effects else None
     if result is None:
         found = found.with_curves()
         task.say("bands, intervals and the next test")
@@ -205,6 +205,14 @@ class Found:
     posterior: Posterior
     tried: Mapping[str, Search]
     curves: Sequence[FreeForm] = ()
+
+    def material(self) -> LoopResult | None:
+        """Return the result where a yield stress, a viscous fluid or a solid is all that is there.
+
+        None for records that noise and instrument errors alone explain, as of a dead sensor.
+        """
+        found = simple_result(self.task, self.posterior)
+        return None if found is None or without_fluid(self.posterior) else found
 
     def with_curves(self) -> "Found":
         """Return what was found with free functions of one variable among the hypotheses."""

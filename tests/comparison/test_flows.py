@@ -138,7 +138,7 @@ def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, opt
     monkeypatch.setattr("discover.comparison.learning.train", given)
     # what else could explain the runs is not looked for: it changes no run
     monkeypatch.setattr("discover.comparison.hypotheses.MOST_EFFECTS", 0)
-    monkeypatch.setattr("discover.comparison.run_comparison.simple_result", lambda *_: None)
+    monkeypatch.setattr("discover.loop.loop.simple_result", lambda *_: None)
     compared = {"learners": ["tensor_sindy"], "high_deborah": [1.5], **options}
     study = parse_study({"data": {"folder": "waves"}, "compare": compared})
     data = oscillations(2001)
