@@ -71,7 +71,9 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if some[at] not in named:
         if classical:
             best = max(classical, key=lambda fit: weights[some.index(fit)])
-            posterior.memory["named"] = _nearest(posterior, best)
+            # not in the memory at hand, which posteriors share that another law may head
+            memory = {**posterior.memory, "named": _nearest(posterior, best)}
+            return replace(posterior, memory=memory)
         return posterior
     chosen = some[at]
     order = [at, *(i for i in np.argsort(-weights, kind="stable") if i != at)]

@@ -26,8 +26,8 @@ def start_up(rate, times):
     return found.y[1]
 
 
-def loop_of(limit=np.inf):
-    """Return the loop on runs of a transducer with a limit, over the largest stress fitted."""
+def runs_of(limit=np.inf):
+    """Return runs of a transducer with a limit, over the largest stress fitted."""
     times, lot = np.linspace(0.05, 6.0, 80), np.random.default_rng(7)
     stress = {name: start_up(rate, times) for name, rate in RATES.items()}
     largest = limit * np.max(stress["c"])
@@ -37,9 +37,13 @@ def loop_of(limit=np.inf):
         shown = np.clip(values, -largest, largest) * noise
         columns = {"time_s": times, "shear_rate_1_s": RATES[name], "stress_Pa": shown}
         tables.append(pd.DataFrame(columns).assign(run=name))
-    data = dc.from_dataframe(pd.concat(tables))
+    return dc.from_dataframe(pd.concat(tables))
+
+
+def loop_of(limit=np.inf):
+    """Return the loop on these runs."""
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    return dc.close_loop(data, base, held_out=["d"], effects=CANDIDATES)
+    return dc.close_loop(runs_of(limit), base, held_out=["d"], effects=CANDIDATES)
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +82,14 @@ def test_a_run_that_no_fit_saw_is_predicted_as_the_transducer_shows_it(clipped):
     # 95 % of 80 samples, three standard errors below
     assert np.mean((low <= record.measured) & (record.measured <= high)) > 0.87
     assert clipped.error_after.held_out < 0.02  # twice its noise
+
+
+@pytest.mark.slow
+def test_a_comparison_says_of_no_law_that_stood_first_before_that_it_is_the_best_classical_one():
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    found = dc.compare(runs_of(limit=0.6), base, held_out=["d"], learners=["tensor_sindy"])
+    assert found.answer.law == "ptt_linear"
+    assert not found.answer.best_classical
 
 
 def test_a_transducer_that_saturates_nowhere_is_not_suspected():
