@@ -143,7 +143,7 @@ def _bands(
     each, bands = 1 + 2 * _DRAWS, []
     values = predicted.reshape(len(parts), each, *predicted.shape[1:])
     apart = np.zeros((len(parts), *predicted.shape[1:3]))
-    reading = _Reading(found, rows)
+    fitted, errors = found.posterior.search.fitter.errors, LinearErrors(problem, rows, 0)
     for at, (part, own, (_, _, linear)) in enumerate(zip(parts, values, drawn, strict=True)):
         fitter = found.posterior.fitter_of(part.fit)
         if isinstance(fitter, WithFunction):
@@ -151,9 +151,9 @@ def _bands(
             for stresses, sizes in zip(own, linear[:, -function.count :], strict=True):
                 _add(function, sizes, stresses, rows, as_recorded)
         if as_recorded:
-            with np.errstate(all="ignore"):  # a law that diverges
-                apart[at, rows.seen] = reading.variance(own[0, rows.seen, 0], part.fit)
-                own[:, rows.seen, 0] = reading.recorded(own[:, rows.seen, 0], linear)
+            seen = own[:, rows.seen, 0]
+            read = _read(fitted, errors, seen, part.fit, linear)
+            own[:, rows.seen, 0], apart[at, rows.seen] = read
     largest = float(np.max(np.abs(problem.fitted.recorded)))
     for i, run in enumerate(runs):
         n = len(run)
@@ -163,38 +163,24 @@ def _bands(
     return bands
 
 
-class _Reading:
-    """How the bench of a search reads runs: the fitted ones as it did, others as runs like these.
+def _read(
+    fitted: LinearErrors,
+    errors: LinearErrors,
+    stress: Float[np.ndarray, "draws rows"],
+    fit: Fit,
+    linear: Float[np.ndarray, "draws q"],
+) -> tuple[Float[np.ndarray, "draws rows"], Float[np.ndarray, " rows"]]:
+    """Return records of draws as the bench reads them, and the variance of what is not known.
 
-    Zero, drift and loading of a run that was fitted are known; those of another are as large.
+    Zero, drift and loading of a run that was fitted are its own; those of another are as large.
     """
-
-    def __init__(self, found: Found, rows: Rows):
-        self.fitted = found.posterior.search.fitter.errors
-        self.errors = LinearErrors(found.posterior.problem, rows, 0)
-        place = {run.name: i for i, run in enumerate(self.fitted.rows.runs)}
-        self.known = np.array([place.get(run.name, -1) for run in rows.runs])
-
-    def recorded(
-        self,
-        predicted: Float[np.ndarray, "draws rows"],
-        linear: Float[np.ndarray, "draws q"],
-    ) -> Float[np.ndarray, "draws rows"]:
-        """Return the records of draws of a hypothesis, of what it predicts and its errors."""
-        errors, draws = self.errors, len(linear)
-        each = linear[:, self.fitted.of_runs].reshape(draws, -1, len(self.fitted.rows.runs))
-        own = np.where(self.known >= 0, each[..., self.known], 0.0)
-        sizes = np.zeros((draws, len(errors)))
-        sizes[:, errors.of_transducers] = linear[:, errors.of_transducers]
-        sizes[:, errors.of_runs] = own.reshape(draws, -1)
-        return errors.recorded(predicted, sizes, np.zeros((len(errors.rows), 0)))
-
-    def variance(self, predicted: Float[np.ndarray, " rows"], fit: Fit):
-        """Return the variance of what runs have of their own that were not fitted."""
-        assert fit.covariance is not None
-        variances = np.diag(fit.covariance)[len(fit.priors) :]
-        apart = self.errors.apart(predicted, fit.linear, variances, self.fitted)
-        return np.where(self.known[self.errors.rows.run] >= 0, 0.0, apart)
+    assert fit.covariance is not None
+    variances = np.diag(fit.covariance)[len(fit.priors) :]
+    with np.errstate(all="ignore"):  # a law that diverges
+        apart = errors.apart(stress[0], fit.linear, variances, fitted)
+        nothing = np.zeros((len(errors.rows), 0))
+        found = errors.recorded(stress, errors.like(fitted, linear), nothing)
+    return found, np.where(errors.places_in(fitted)[errors.rows.run] >= 0, 0.0, apart)
 
 
 def _drawn(found: Found, fit: Fit, as_recorded: bool):

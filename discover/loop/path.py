@@ -30,12 +30,8 @@ def predicted(fitter: Fitter, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may diverge
         found = problem.model.predictions([fit.theta], rows.batch)[0]
     if held_out:
-        fitted, fitter = fitter.errors.of_runs, fitter.at(Fitter(problem, rows))
-        ahead = np.zeros(len(fitter.errors))
-        of_transducers = fitter.errors.of_transducers
-        ahead[of_transducers] = linear[of_transducers]
-        ahead[fitter.errors.of_runs.stop :] = linear[fitted.stop :]
-        linear = ahead
+        fitted, fitter = fitter.errors, fitter.at(Fitter(problem, rows))
+        linear = fitter.errors.like(fitted, linear)
     own, flat = fitter.start(fit.names, fit.theta), rows.flat(found[None])
     own.shifts = fitter.shifts_at(fit.theta)
     found[rows.seen] = fitter.records(own, flat, linear[None])[0]

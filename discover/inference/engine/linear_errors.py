@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.inference.engine.priors import Deviations
 from discover.inference.engine.problem import (
@@ -129,6 +129,28 @@ class LinearErrors:
             gain, rest = gain + rest[:, self.rows.run], rest[:, runs:]
         found = predicted * (1.0 + gain) + zeros @ self._zeros.T
         return found + rest[:, :k] @ shifts.T if k else found
+
+    def like(
+        self, fitted: "LinearErrors", sizes: Float[np.ndarray, "*draws q"]
+    ) -> Float[np.ndarray, "*draws own"]:
+        """Return sizes here of those of fitted runs: what is shared, and what a run had there.
+
+        Zero, drift and loading of a run that was not fitted are none.
+        """
+        found = np.zeros((*sizes.shape[:-1], len(self)))
+        found[..., self.of_transducers] = sizes[..., self.of_transducers]
+        shared = sizes[..., fitted.of_runs.stop :]
+        found[..., self.of_runs.stop :] = shared[..., : len(self) - self.of_runs.stop]
+        each = sizes[..., fitted.of_runs].reshape(*sizes.shape[:-1], -1, len(fitted.rows.runs))
+        known = self.places_in(fitted)
+        own = np.where(known >= 0, each[..., known], 0.0)
+        found[..., self.of_runs] = own.reshape(*sizes.shape[:-1], -1)
+        return found
+
+    def places_in(self, fitted: "LinearErrors") -> Int[np.ndarray, " runs"]:
+        """Return where each run stands among fitted ones; -1 of another."""
+        place = {run.name: i for i, run in enumerate(fitted.rows.runs)}
+        return np.array([place.get(run.name, -1) for run in self.rows.runs])
 
     def apart(
         self,
