@@ -9,6 +9,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
 from discover.inference.engine import Posterior
+from discover.inference.engine.bands import SIMPLE_FLUIDS
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import TERM_ODDS
 from discover.linear_algebra_threads import in_one_thread
@@ -25,10 +26,6 @@ _SAMPLES = 81
 _STRAIN, _HENCKY = 20.0, 3.0
 _LEAST_LIKELY = 0.01  # Of the likeliest law, below which one changes nothing
 _SEED = 20261128
-
-SIMPLE_FLUIDS = -2.0 / 7.0
-"""Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
-at small strain with independent alignment; measured ratios lie between that and zero]."""
 
 _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
 

@@ -21,20 +21,16 @@ from discover.loop.runs import RunRecord, record_runs
 _NEGLIGIBLE = 1e-4  # Probability below which an explanation is not listed
 
 
-def predicted(fitter: Fitter, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
+def predicted(fitter: Fitter, fit: Fit, rows: Rows) -> Float[np.ndarray, "runs n"]:
     """Return what a hypothesis predicts of runs, with what the bench does.
 
     Of runs that no fit saw, with what all runs share: zero, drift and loading are of each run.
     """
-    problem, linear = fitter.problem, fit.linear
+    errors, moduli = fitter.errors_of(rows), fitter.moduli_of(fit.linear)[None]
     with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may diverge
-        found = problem.model.predictions([fit.theta], rows.batch)[0]
-    if held_out:
-        fitted, fitter = fitter.errors, fitter.at(Fitter(problem, rows))
-        linear = fitter.errors.like(fitted, linear)
-    own, flat = fitter.start(fit.names, fit.theta), rows.flat(found[None])
-    own.shifts = fitter.shifts_at(fit.theta)
-    found[rows.seen] = fitter.records(own, flat, linear[None])[0]
+        found = fitter.problem.model.predictions([fit.theta], rows.batch, moduli)[0]
+        linear, nothing = errors.like(fitter.errors, fit.linear), np.zeros((len(rows), 0))
+        found[rows.seen] = errors.recorded(rows.flat(found[None]), linear[None], nothing)[0]
     return found
 
 
@@ -43,7 +39,7 @@ def records_of(search: Search, fit: Fit) -> list[RunRecord]:
     problem, found = search.problem, []
     for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
         if rows is not None:
-            own = predicted(search.fitter, fit, rows, held_out)[None]
+            own = predicted(search.fitter, fit, rows)[None]
             found += record_runs(rows.runs, own, held_out)
     return found
 
@@ -144,7 +140,7 @@ class Path:
         """Return what a hypothesis predicts of runs, held out or fitted."""
         theta = self.theta_ahead(fit) if held_out else fit.theta
         fitter = self.posterior.fitter_of(fit)
-        return predicted(fitter, replace(fit, theta=theta), rows, held_out)
+        return predicted(fitter, replace(fit, theta=theta), rows)
 
     def declared_predicted(self, rows: Rows) -> Float[np.ndarray, "runs n"]:
         """Return what the declared model predicts, its constants as fitted and the bench ideal."""
@@ -164,7 +160,7 @@ class Path:
         """All runs with the predictions of every stage, bands, and those of each explanation."""
         problem, found = self.posterior.problem, []
         fits = [self.fitted(one.members[0]) for one in self._listed]
-        bands = self.posterior.bands() or []
+        bands = self.posterior.bands()
         for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
             if rows is None:
                 continue
@@ -176,7 +172,8 @@ class Path:
             for i, record in enumerate(records):
                 n = len(record.time)
                 if held_out:
-                    band = np.stack([bands[i].low, bands[i].high]) if bands else None
+                    own = bands[i]
+                    band = None if own is None else np.stack([own.low, own.high])[..., 0]
                 else:
                     band = self._fitted_bands[:, rows.run == i]
                 own = np.stack([one[i, :n] for one in each]) if each else None

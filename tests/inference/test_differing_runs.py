@@ -64,4 +64,4 @@ def test_a_zero_that_runs_have_in_common_is_expected_of_the_next_one_too(signs, 
     posterior = explain(Problem(DeclaredModel.maxwell([1.0], [1.0]), [], fitted, [ahead]))
     (band,) = posterior.bands()
     truth = 1.1 * (1.0 - np.exp(-TIMES))
-    assert least * zero < np.mean(band.middle - truth) < most * zero
+    assert least * zero < np.mean(band.middle[:, 0] - truth) < most * zero

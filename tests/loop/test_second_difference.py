@@ -7,7 +7,7 @@ from independent.chains import KBKZ
 from independent.flow import start_up
 
 import discover as dc
-from discover.comparison.bands import SIMPLE_FLUIDS
+from discover.inference.engine.bands import SIMPLE_FLUIDS
 
 FLUID, TIMES = KBKZ(0.2, modulus=60.0, relaxation_time=1.3), np.linspace(0.05, 6.0, 60)
 RATES = {"a": 0.7, "b": 1.5, "c": 3.0, "d": 4.5}

@@ -1,153 +1,254 @@
-"""Bands of runs that were not fitted: mixtures over hypotheses, and what none of them holds."""
+"""Predictions of a posterior in any run: mixtures over hypotheses with their 95 % bands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.special import ndtr, ndtri
 
-from discover.inference.engine.fits import Fit, Fitter
+from discover.effects import ConstitutiveEffect
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
+from discover.inference.engine.noise import deviation
+from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
+from discover.inference.engine.variables import SLIP_CURVE, Variable
+from discover.inference.engine.with_function import WithFunction
+from discover.statistics.noise.noise_model import rms
 
 _RUNS_AWAY = 10.0
-"""Times the size of the largest record, which no sound prediction of another run exceeds."""
+"""Times the largest stress recorded, or predicted as declared, which no sound law exceeds."""
 
-_DRAWS = 12
-"""Pairs of draws of the constants of a hypothesis."""
+_LEAST = 1e-3
+"""Weight below which a hypothesis changes no band."""
 
-NEGLIGIBLE = 1e-3
-"""Probability below which nothing is made of it that none of the hypotheses is all there is."""
+_LOST = 0.5
+"""Weight of hypotheses that may diverge in a run in which the others still make a band."""
 
-_SEED = 20261128
+_POWERS = np.array([1.0, 2.0, 2.0])
+"""Powers of the shear stress with which σ12, N1 and N2 go   [second-order fluid: Bird, Armstrong &
+Hassager 1987, ch. 6], and so their relative errors."""
+
+_UNRELATED = np.array([0.0, 2.0, 0.0]), np.array([0.0, 0.05, 0.0])
+"""Relative errors that a law has in N1 besides, for what relates N1 to σ12 is not known either:
+over the error of σ12, and at least. On development seeds laws of no library that others fit to the
+noise have N1 off by 4 to 13 %."""
+
+SIMPLE_FLUIDS = -2.0 / 7.0
+"""Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
+at small strain with independent alignment; measured ratios lie between that and zero]."""
+
+Laws = Sequence[tuple[Fit, float]]
+"""Hypotheses with weights that add up to one."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """A prediction of one run with its 95 % band, in Pa; all of shape (n,)."""
+    """A prediction of one run with its 95 % band: what is recorded, N1 and N2, shape (n, 3)."""
 
-    middle: Float[np.ndarray, " n"]
-    low: Float[np.ndarray, " n"]
-    high: Float[np.ndarray, " n"]
+    middle: Float[np.ndarray, "n 3"]
+    low: Float[np.ndarray, "n 3"]
+    high: Float[np.ndarray, "n 3"]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one hypothesis predicts of rows, and in which runs it does not run away."""
+
+    weight: float
+    middle: Float[np.ndarray, "rows 3"]
+    variance: Float[np.ndarray, "rows 3"]
+    sound: Bool[np.ndarray, " runs"]
 
 
 class Predictions:
-    """Normal predictions of rows that were not fitted, one for each hypothesis."""
+    """What a posterior predicts of runs: a normal distribution for each hypothesis.
 
-    def __init__(self, posterior: Any, rows: Rows):
+    `posterior`, `rows`: the posterior, and the runs to predict. `as_recorded`: as the bench reads
+    them, or of the fluid alone. `noise`: whether with the noise of the fitted runs.
+    """
+
+    def __init__(self, posterior: Any, rows: Rows, as_recorded: bool = True, noise: bool = False):
         self.posterior, self.rows = posterior, rows
+        self.as_recorded, self.noise = as_recorded, noise
         self.problem = posterior.problem
-        self.fitter = Fitter(self.problem, rows)
-        self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
+        known = np.nan_to_num(np.abs(self._observed([self.problem.zero])[0, :, 0]), posinf=0.0)
+        largest = np.full(len(rows.runs), np.max(np.abs(self.problem.fitted.recorded)))
+        np.maximum.at(largest, rows.run, known)
+        self._limit = _RUNS_AWAY * largest
 
-    def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return weight, mean and variance of the rows, of each hypothesis."""
-        none, posterior = self.posterior.unexplained, self.posterior
-        found = [
-            ((1.0 - none) * share, *self._of_fit(fit))
-            for fit, share in self._sound(posterior.fits)
-            if (1.0 - none) * share > 1e-4
-        ]
-        found += [
-            (none * share, *self._of_none(fit))
-            for fit, share in self._sound(
-                posterior.beside_curves(posterior.by_left_out or posterior.fits)
-            )
-            if none * share > NEGLIGIBLE
-        ]
-        return found
+    def bands(self, of_none: Laws) -> list[Band | None]:
+        """Return the band of each run; None where most hypotheses run away.
 
-    def _sound(self, fits: Sequence[tuple[Fit, float]]) -> list[tuple[Fit, float]]:
-        """Return hypotheses that do not run away in these rows, their weights adding up to one."""
-        followed = {id(fit) for fit in self.followed([fit for fit, _ in fits])}
-        sound = [(f, p) for f, p in fits if id(f) in followed]
-        if not sound:  # where all that are likely run away, the likeliest that does not
-            sound = [(fit, 1.0) for fit in self.followed(self.posterior.search.alive())[:1]]
-        total = sum(p for _, p in sound)
-        return [(f, p / total) for f, p in sound]
+        Hypotheses are weighed by their evidence. `of_none`: those to rely on where none is all
+        there is: every stress is then missed as runs left out are, more beyond the fastest rate,
+        and N2 is as likely anything from −2/7 N1 to zero.
+        """
+        none = self.posterior.unexplained
+        parts: list[_Part] = []
+        for share, laws, is_none in (
+            (1.0 - none, self.posterior.fits, False),
+            (none, of_none, True),
+        ):
+            for fit, weight in laws:
+                if share * weight > _LEAST and fit.covariance is not None:
+                    parts += self._parts(fit, share * weight, is_none)
+        return [self._band(parts, i) for i in range(len(self.rows.runs))]
 
     def followed(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Return those of some fits that do not run away in these rows."""
-        new = [fit for fit in fits if "ahead" not in fit.memory]
-        found = self.fitter.predict([fit.theta for fit in new])
-        for fit, predicted in zip(new, found, strict=True):
-            with np.errstate(invalid="ignore"):
-                sound = bool(np.all(np.abs(predicted) < self._largest))
-            fit.memory["ahead"] = predicted if sound else None
-        return [fit for fit in fits if fit.memory["ahead"] is not None]
+        """Return those of some hypotheses that run away in none of the runs."""
+        found = self._observed([fit.theta for fit in fits])[..., 0]
+        return [
+            fit for fit, one in zip(fits, found, strict=True) if np.all(self._is_sound(one[None]))
+        ]
 
-    def _ahead(self, fit: Fit) -> Float[np.ndarray, " rows"] | None:
-        """Return what the model of a fit predicts; None where it runs away."""
-        self.followed([fit])
-        return fit.memory["ahead"]
+    def _observed(self, thetas: Any, moduli: Any = None) -> np.ndarray:
+        """Return the rows of what is recorded, N1 and N2 by vectors, shape (vectors, rows, 3)."""
+        with np.errstate(all="ignore"):
+            found = self.problem.model.observables(thetas, self.rows.batch, moduli)
+        return np.asarray(found)[:, self.rows.seen]
 
-    def _apart(self, fit: Fit, predicted: np.ndarray) -> Float[np.ndarray, " rows"]:
-        """Return the variance of what each run has of its own, as large as in the fitted ones."""
+    def _is_sound(self, record: Float[np.ndarray, "draws rows"]) -> Bool[np.ndarray, "draws runs"]:
+        """Return in which runs each of some records does not run away."""
+        with np.errstate(invalid="ignore"):
+            fine = np.abs(record) < self._limit[self.rows.run]
+        runs = range(len(self.rows.runs))
+        return np.stack([np.all(fine[:, self.rows.run == i], axis=1) for i in runs], axis=1)
+
+    def _moved(self, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return constants, moduli, and what is linear: the likeliest, then of steps both ways.
+
+        A step is one standard deviation along each independent direction of what is uncertain.
+        """
         assert fit.covariance is not None
-        variances, fitted = np.diag(fit.covariance)[len(fit.priors) :], self.posterior.search.fitter
-        return self.fitter.errors.apart(predicted, fit.linear, variances, fitted.errors)
+        steps = np.eye(len(fit.covariance))
+        thetas, linear = fit.drawn(np.concatenate([0.0 * steps[:1], steps, -steps]))
+        moduli = self.posterior.search.fitter.moduli_of(linear)
+        if not self.as_recorded:
+            thetas[:, self._of_bench] = self.problem.zero[self._of_bench]
+        return thetas, moduli, linear
 
-    def _jacobian(self, fit: Fit, predicted: np.ndarray) -> Float[np.ndarray, "rows n"]:
-        """Return derivatives of the rows, of those of the fitted runs that they share."""
-        if "jacobian" in fit.memory:
-            return fit.memory["jacobian"]
-        ahead = self.fitter.start(fit.names, fit.theta)
-        ahead.predicted = predicted
-        self.fitter.linearise([ahead])
-        assert ahead.jacobian is not None
-        own = ahead.jacobian[:, : len(fit.priors)]
-        # of what is linear, only transducers and moduli are those of the fitted runs
-        linear = ahead.jacobian[:, len(fit.priors) :]
-        fitted, alone = self.posterior.search.fitter.errors.of_runs, self.fitter.errors.of_runs
-        shared = np.zeros((len(self.rows), len(fit.linear)))
-        of_transducers = self.fitter.errors.of_transducers
-        shared[:, of_transducers] = linear[:, of_transducers]
-        shared[:, fitted.stop :] = linear[:, alone.stop :]
-        gain = self.fitter.errors.gain(fit.linear)[:, None]
-        fit.memory["jacobian"] = found = np.column_stack([own * gain, shared])
+    @property
+    def _of_bench(self) -> list[int]:
+        """Positions of constants of the instrument, of the clock too where it is not fitted."""
+        effects, model = self.problem.effects, self.problem.model
+        names = {n for n, e in effects.items() if not isinstance(e, ConstitutiveEffect)}
+        names |= {SLIP_CURVE.name, *(nuisance.effect for nuisance in NUISANCES)}
+        at = [place for name in names for place in model.positions(name)]
+        return at if 1 in self.problem.declared.free_positions else [1, *at]
+
+    def _parts(self, fit: Fit, weight: float, is_none: bool) -> list[_Part]:
+        """Return what a hypothesis predicts; two where N2 may be as it says, or anything."""
+        thetas, moduli, linear = self._moved(fit)
+        # what is linear in the records moves no prediction of the model
+        vectors = np.column_stack([thetas, moduli])
+        moved = np.append(True, np.any(vectors[1:] != vectors[0], axis=1))
+        place = np.where(moved, np.cumsum(moved) - 1, 0)
+        values = self._observed(thetas[moved], moduli[moved])[place]
+        sound = self._is_sound(values[..., 0])
+        fitter = self.posterior.fitter_of(fit)
+        if isinstance(fitter, WithFunction) and fitter.variable.slot == "network":
+            function = fitter.variable.at(self.rows)
+            first = 1 if self.as_recorded else 0  # the record has it among what is linear
+            values[..., first:] *= _factor(function, linear)[..., None]
+        apart: Any = 0.0
+        if self.as_recorded:
+            values[..., 0], apart = self._read(fitter, values[..., 0], fit, linear)
+        middle, off = values[0], values[1:] - values[0]
+        ways = np.nan_to_num(np.where(sound[1:, self.rows.run, None], off, 0.0))
+        variance = 0.5 * np.sum(ways**2, axis=0)
+        size = self._sizes(middle)
+        variance[:, 0] += apart
+        if self.noise:
+            noise = fit.noise.common * deviation(size[:, 0], middle[:, 0], fit.noise.share)
+            variance[:, 0] += noise**2
+        if is_none:
+            missed, (share, least) = self._missed(fit)[:, None], _UNRELATED
+            off = (missed * _POWERS) ** 2 + np.maximum(missed * share, least) ** 2
+            variance = variance + off * size**2
+        found = _Part(weight, middle, variance, sound[0])
+        if not (is_none or self.problem.leaves_second_difference_open(fit.names)):
+            return [found]
+        prior, wide = middle.copy(), variance.copy()
+        prior[:, 2] = 0.5 * SIMPLE_FLUIDS * middle[:, 1]
+        wide[:, 2] += (SIMPLE_FLUIDS * middle[:, 1]) ** 2 / 12.0
+        halves = (middle, variance), (prior, wide)
+        return [_Part(0.5 * weight, *half, sound[0]) for half in halves]
+
+    def _read(
+        self,
+        fitter: Any,
+        record: Float[np.ndarray, "draws rows"],
+        fit: Fit,
+        linear: Float[np.ndarray, "draws q"],
+    ) -> tuple[Float[np.ndarray, "draws rows"], Float[np.ndarray, " rows"]]:
+        """Return records as the bench reads them, and the variance of what is not known.
+
+        Zero, drift and loading of a run that was fitted are its own; those of another are as large.
+        """
+        assert fit.covariance is not None
+        fitted, errors = fitter.errors, fitter.errors_of(self.rows)
+        variances = np.diag(fit.covariance)[len(fit.priors) :]
+        with np.errstate(all="ignore"):  # a law that runs away
+            apart = errors.apart(record[0], fit.linear, variances, fitted)
+            nothing = np.zeros((len(self.rows), 0))  # moduli were moved themselves
+            found = errors.recorded(record, errors.like(fitted, linear), nothing)
+        return found, np.where(errors.places_in(fitted)[self.rows.run] >= 0, 0.0, apart)
+
+    def _sizes(self, middle: Float[np.ndarray, "rows 3"]) -> Float[np.ndarray, "rows 3"]:
+        """Return the size of each stress, N2's by N1: of a curve each value, else of the run."""
+        of_runs = np.column_stack([self.rows.rms_by_run(one)[self.rows.run] for one in middle.T])
+        found = np.where(self.rows.alone[:, None], np.abs(middle), of_runs)
+        found[:, 2] = -SIMPLE_FLUIDS * found[:, 1]
         return found
 
-    def _of_fit(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-        predicted = self._ahead(fit)
-        assert predicted is not None
-        assert fit.covariance is not None
-        jacobian, apart = self._jacobian(fit, predicted), self._apart(fit, predicted)
-        middle = predicted + jacobian[:, len(fit.priors) :] @ fit.linear
-        variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
-        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
-        return middle, variance + noise**2
+    def _missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
+        """Return the deviation, over its size, by which rows may be missed, from runs left out.
 
-    def _of_none(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a hypothesis says of the rows where it is not all there is.
-
-        It misses them as it misses fitted runs that are left out in turn, by more where a run is
-        faster. Constants are drawn, for to first order what is far would grow without bound.
+        Of a hypothesis that was not fitted without each run, that of the best, and more by as much
+        as it misses the fitted runs by more.
         """
-        predicted = self._ahead(fit)
-        assert predicted is not None
-        assert fit.covariance is not None
-        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.covariance)))
-        thetas, linear = fit.drawn(np.concatenate([lot, -lot]))
-        found = self.fitter.predict(thetas)
-        sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
-        apart = self._apart(fit, predicted)
-        errors = self.posterior.fitter_of(fit).at(self.fitter).errors
-        middle = errors.as_read(predicted, fit.linear)
-        pairs = zip(found[sound], linear[sound], strict=True)
-        off = [errors.as_read(*pair) - middle for pair in pairs]
-        spread = np.mean(np.square(off), axis=0) if off else 0.0
-        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
-        missed = self.missed(fit) * self.rows.size
-        return middle, spread + apart + missed**2 + noise**2
+        posterior, best = self.posterior, fit
+        if "missed" not in fit.memory and not posterior.has_function(fit) and posterior.left:
+            best = posterior.left.fit
+        missed, fastest = posterior.missed(best), np.max(self.problem.fitted.fastest)
+        worse = 1.0
+        if best is not fit:
+            own, least = (posterior.fitter_of(one).misfit(one) for one in (fit, best))
+            worse = max(own / max(least, 1e-150), 1.0)
+        size = of_the_next_run(len(missed)) * rms(missed) * worse
+        beyond = np.maximum(self.rows.fastest / fastest, 1.0)
+        return np.minimum(size * beyond, MOST_MISSED)[self.rows.run]
 
-    def missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
-        """Return the deviation, over its size, by which each run may be missed."""
-        missed, fastest = self.posterior.missed(fit), self.problem.fitted.fastest
-        # as far as the worst of them, and in proportion to the rate beyond the fastest
-        size = np.max(missed) * np.maximum(self.rows.fastest / np.max(fastest), 1.0)
-        return np.minimum(of_the_next_run(len(missed)) * size, MOST_MISSED)[self.rows.run]
+    def _band(self, parts: Sequence[_Part], run: int) -> Band | None:
+        """Return the mixture in one run of the hypotheses that can be followed there."""
+        at, some = self.rows.run == run, [part for part in parts if part.sound[run]]
+        kept, total = (sum(part.weight for part in one) for one in (some, parts))
+        if not some or kept < _LOST * total:
+            return None
+        middles = np.array([part.middle[at].ravel() for part in some])
+        variances = np.array([part.variance[at].ravel() for part in some])
+        told = np.all(np.isfinite(middles) & np.isfinite(variances), axis=0)
+        limits = np.full((3, middles.shape[1]), np.nan)
+        weights = np.array([part.weight for part in some])
+        limits[:, told] = quantiles(
+            weights, middles[:, told], variances[:, told], (0.025, 0.5, 0.975)
+        )
+        low, middle, high = limits.reshape(3, -1, 3)
+        return Band(middle, low, high)
+
+
+def _factor(
+    function: Variable, linear: Float[np.ndarray, "draws q"]
+) -> Float[np.ndarray, "draws rows"]:
+    """Return a factor on all stresses that depends on the strain: it is of the fluid.
+
+    The damping function of Wagner 1976, Rheol. Acta 15, 136.
+    """
+    assert function.values is not None
+    return 1.0 + linear[:, -function.count :] @ function.basis(function.values).T
 
 
 def quantiles(

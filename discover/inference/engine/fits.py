@@ -58,11 +58,11 @@ class Fitter:
         self._priors: dict[tuple[str, ...], tuple[Priors, np.ndarray]] = {}
         self._moduli = self._moved_moduli()
         self._shifts = np.zeros((len(rows), len(self._moduli)))
-        self.errors = LinearErrors(problem, rows, self._shifts.shape[1])
+        self.errors = self.errors_of(rows)
 
-    def at(self, fitter: "Fitter") -> "Fitter":
-        """Return what predicts other rows as this one does; `fitter` has only the model."""
-        return fitter
+    def errors_of(self, rows: Rows) -> LinearErrors:
+        """Return what is linear in the records of other rows."""
+        return LinearErrors(self.problem, rows, len(self._moduli))
 
     def noise_of(self, fit: Fit) -> NoiseModel:
         """Return the likelihood of the rows that a fit sees."""
@@ -81,11 +81,13 @@ class Fitter:
         moves[:, : len(root)] = _MOVED * root.T
         return moduli + moves
 
-    def shifts_at(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "rows k"]:
-        """Return what errors of the moduli do to the predictions of a vector, in Pa."""
-        moduli = np.vstack([self.problem.moduli, self._moduli])
-        base, *moved = self.predict([theta] * len(moduli), moduli)
-        return self._shifts_of(np.array(moved).reshape(-1, len(base)), base)
+    def moduli_of(self, linear: Float[np.ndarray, "*draws q"]) -> Float[np.ndarray, "*draws c"]:
+        """Return the moduli in Pa, and the solvent's viscosity, with their errors."""
+        moduli = np.tile(self.problem.moduli, (*linear.shape[:-1], 1))
+        if (root := self.problem.modulus_root) is not None:
+            first = self.errors.of_runs.stop
+            moduli[..., : len(root)] += linear[..., first : first + root.shape[1]] @ root.T
+        return moduli
 
     def _shifts_of(
         self, moved: Float[np.ndarray, "k rows"], predicted: Float[np.ndarray, " rows"]

@@ -64,6 +64,16 @@ class Noise:
     share: float
 
 
+def deviation(
+    size: Float[np.ndarray, " rows"], predicted: Float[np.ndarray, " rows"], share: float
+) -> Float[np.ndarray, " rows"]:
+    """Return the standard deviation of rows over the size of the noise of their run, in Pa.
+
+    `size`: of each record. `share`: of the variance that goes as the square of the stress.
+    """
+    return size * np.sqrt(1.0 - share + share * (predicted / size) ** 2)
+
+
 class NoiseModel:
     """The likelihood of residuals of rows, with noise integrated out.
 
@@ -107,8 +117,7 @@ class NoiseModel:
 
     def deviation(self, predicted: Float[np.ndarray, " rows"], share: float):
         """Return the standard deviation of each row over the size of its run's noise, in Pa."""
-        size = self.rows.size
-        return size * np.sqrt(1.0 - share + share * (predicted / size) ** 2)
+        return deviation(self.rows.size, predicted, share)
 
     def log_likelihood(
         self, residual: Float[np.ndarray, " rows"], predicted: Float[np.ndarray, " rows"]

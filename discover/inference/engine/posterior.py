@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.effects.library_term import LibraryTerm
-from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quantiles
+from discover.inference.engine.bands import Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeFunction
@@ -20,6 +20,9 @@ from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
 from discover.linear_algebra_threads import in_one_thread
 from discover.statistics.noise.whiteness import FEWEST_TESTED, smooth_misfit_probability
+
+_NEGLIGIBLE = 1e-3
+"""Probability below which nothing is made of it that none of the hypotheses is all there is."""
 
 WINDOW = 12.0
 """Log odds below the best from which on a hypothesis counts no longer."""
@@ -206,25 +209,13 @@ class Posterior:
         return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - fit.noise.common**2, 0.0))
 
     @in_one_thread
-    def bands(self) -> list[Band]:
-        """Return the bands of the predicted runs, by the fitted runs alone.
-
-        Hypotheses are weighed by their evidence. Where none is all there is, each misses a run as
-        it misses fitted ones that are left out in turn.
-        """
+    def bands(self) -> list[Band | None]:
+        """Return the bands of the predicted runs with their noise, by the fitted runs alone."""
         rows = self.problem.predicted
         if rows is None:
             return []
-        parts = Predictions(self, rows).parts()
-        if not parts:
-            return []
-        weights = np.array([p[0] for p in parts])
-        middle, variance = (np.array([p[i] for p in parts]) for i in (1, 2))
-        low, mid, high = quantiles(weights, middle, variance, (0.025, 0.5, 0.975))
-        return [
-            Band(mid[rows.run == i], low[rows.run == i], high[rows.run == i])
-            for i in range(len(rows.runs))
-        ]
+        of_none = self.beside_curves(self.by_left_out or self.fits)
+        return Predictions(self, rows, noise=True).bands(of_none)
 
 
 @in_one_thread
@@ -274,7 +265,7 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     none = own[0] + np.logaddexp(
         left.log_factor + LOG_ODDS_OF_NONE, _unlike_noise(search.fitter, near[0])
     )
-    enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > NEGLIGIBLE
+    enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > _NEGLIGIBLE
     # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is
     if enough and none > among:
         found.by_left_out = _foretelling(found)

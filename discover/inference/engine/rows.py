@@ -81,6 +81,11 @@ class Rows:
     def __len__(self) -> int:
         return len(self.recorded)
 
+    @property
+    def alone(self) -> Bool[np.ndarray, " rows"]:
+        """Whether a row is a value of a curve, an experiment of its own."""
+        return np.array([run.protocol.control in _CURVES for run in self.runs])[self.run]
+
     def flat(
         self, predicted: Float[np.ndarray, "trials runs n"]
     ) -> Float[np.ndarray, "trials rows"]:
@@ -95,8 +100,7 @@ class Rows:
 
     def sizes_of(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " rows"]:
         """Return the sizes with values of a curve as they are predicted, without their noise."""
-        alone = np.array([run.protocol.control in _CURVES for run in self.runs])
-        return np.where(alone[self.run], np.abs(predicted), self.size)
+        return np.where(self.alone, np.abs(predicted), self.size)
 
     def rms_by_run(self, values: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " runs"]:
         """Return the root mean square over the rows of each run."""

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.linear_errors import LinearErrors
 from discover.inference.engine.priors import Deviations, Prior
+from discover.inference.engine.rows import Rows
 from discover.inference.engine.variables import (
     INNER,
     KNOTS,
@@ -89,9 +90,9 @@ class WithFunction(Fitter):
         """Return what one of each change of slope does to the records, in Pa."""
         return self.variable.columns(fit.predicted)
 
-    def at(self, fitter: Fitter) -> "WithFunction":
-        """Return what predicts other rows with the function as it was fitted."""
-        return WithFunction(fitter, self.variable.at(fitter.rows), self.width)
+    def errors_of(self, rows: Rows) -> LinearErrors:
+        """Return what is linear in the records of other rows, with the function as it is here."""
+        return _WithColumns(super().errors_of(rows), self.variable.at(rows), self.width)
 
     def on(self, fitter: Fitter) -> "WithFunction | None":
         """Return what fits the like to other rows; None where these have no such variable."""
@@ -165,8 +166,6 @@ class WithSlip(Fitter):
     def on(self, fitter: Fitter) -> "WithSlip":
         """Return the same on other rows."""
         return WithSlip(fitter, self.width)
-
-    at = on
 
     def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
         """Return the priors of all that is free, those of the curve last."""
