@@ -75,6 +75,16 @@ def split_runs(
     return list(prepared(fitted.runs)), list(prepared(held.runs)), spikes
 
 
+def unfitted_runs(dataset: Dataset, runs: Sequence[Run]) -> list[Run]:
+    """Return N1 and N2 that runs recorded besides, without samples that no fluid can have."""
+    sound = {run.name: run.time for run in dataset.quantity_by_quantity()}
+    names = {run.name for run in runs}
+    found = [run.observing(quantity) for run in runs for quantity in run.beside]
+    found = [one for one in found if one.name in sound.keys() - names]
+    found = [one.window(np.isin(one.time, sound[one.name])) for one in found]
+    return [one for one in found if len(one) >= FEWEST_SAMPLES]
+
+
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
     """Return the strain of a run at its samples: recorded, or of its commanded rate.
 
@@ -192,6 +202,17 @@ class RunRecord:
     def fastest(self) -> float:
         """Largest rate, in 1/s."""
         return float(np.max(np.abs(self.rate)))
+
+    @property
+    def scatter(self) -> float:
+        """Deviation of what changes from sample to sample, at most that about the mean."""
+        return min(fast_part(self.measured), float(np.std(self.measured)))
+
+    @property
+    def mean_below(self) -> float:
+        """Bound below which the mean of the record lies, without its sign, at 95 %."""
+        error = np.std(self.measured) / len(self.measured) ** 0.5
+        return float(abs(np.mean(self.measured)) + 1.645 * error)  # of a normal variable
 
     @property
     def shift(self) -> float:
