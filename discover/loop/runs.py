@@ -78,9 +78,8 @@ def split_runs(
 def unfitted_runs(dataset: Dataset, runs: Sequence[Run]) -> list[Run]:
     """Return N1 and N2 that runs recorded besides, without samples that no fluid can have."""
     sound = {run.name: run.time for run in dataset.quantity_by_quantity()}
-    names = {run.name for run in runs}
     found = [run.observing(quantity) for run in runs for quantity in run.beside]
-    found = [one for one in found if one.name in sound.keys() - names]
+    found = [one for one in found if one.name in sound.keys() - {run.name for run in runs}]
     found = [one.window(np.isin(one.time, sound[one.name])) for one in found]
     return [one for one in found if len(one) >= FEWEST_SAMPLES]
 

@@ -68,13 +68,14 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 
 
 def _fitted(answer: Answer) -> str:
-    """Return in which flows constants were fitted, and at which temperature times hold."""
+    """Return in which flows constants were fitted, where, and at which temperature times hold."""
     if not any(one.ci95 for one in answer.constants):
         return ""
     at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
     for used, factor in answer.shift_factors.items():
         if [*answer.range.by_temperature] == [used]:
-            at += f", {modes.shortened(factor)} at {modes.degrees(used)}"
+            there = f" at {modes.degrees(used)}"
+            at = f"{there}{at}, {modes.shortened(factor)}{there}"
     return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
 
 

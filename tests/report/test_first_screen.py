@@ -259,7 +259,9 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     assert "modes at −35 °C: G" in render("answer.html", screen=screen)
     hot = replace(shifted, range=replace(MELT.range, by_temperature={-10.0: MELT.range}))
     told = answer_screen(hot)["fitted"]
-    assert told == " (fitted in shear; times at −35 °C, shorter by a factor of 131 at −10 °C)"
+    assert told == (
+        " (fitted in shear at −10 °C; times at −35 °C, shorter by a factor of 131 at −10 °C)"
+    )
     cold = replace(shifted, shift_factors={-50.0: 20.0})
     assert any("times are longer by a factor of 20 at −50 °C" in line for line in cold.lines)
     clock = "times on the instrument's clock"  # which is not shifted
