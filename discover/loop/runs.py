@@ -17,7 +17,7 @@ from discover.loop.parts import ErrorPair
 from discover.protocols import strains
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise.noise_model import independent_samples, rms
 from discover.statistics.residual import fast_part
 from discover.words import counted
 
@@ -209,9 +209,9 @@ class RunRecord:
 
     @property
     def mean_below(self) -> float:
-        """Bound below which the mean of the record lies, without its sign, at 95 %."""
-        error = np.std(self.measured) / len(self.measured) ** 0.5
-        return float(abs(np.mean(self.measured)) + 1.645 * error)  # of a normal variable
+        """Bound below which the mean of the record lies, without its sign, with 95 % (normal)."""
+        off = self.measured - (mean := float(np.mean(self.measured)))
+        return abs(mean) + 1.645 * float(np.std(off)) / independent_samples(off) ** 0.5
 
     @property
     def shift(self) -> float:
