@@ -54,9 +54,9 @@ def errors(answer: Any) -> list[Errors]:
             measured.append(Row(symbol, _note(answer, one), _inside(answer, one), beyond, at))
         if near or far:
             apart = True
-            by_law.append(Row(symbol, one.note * bool(near), near, far))
+            by_law.append(Row(symbol, one.note * bool(near), near or "see above", far))
         elif not one.is_known:
-            row = Row(symbol, one.note, one.missing, None)
+            row = Row(symbol, "", ": ".join(filter(None, ["untested", one.note])), None)
             if by_law and by_law[-1] == row._replace(symbol=by_law[-1].symbol):
                 row = row._replace(symbol=f"{by_law.pop().symbol}, {symbol}")
             by_law.append(row)
@@ -69,13 +69,13 @@ def errors(answer: Any) -> list[Errors]:
         told = f"falls above {answer.falls_above}"
         by_law.append(Row("steady flow curve", "of this law", told, None))
     heads = (_INSIDE, _TWICE) if apart else ("", "")
-    title = f"{_NOT_COMPARED}{'; equally good laws differ by' * apart}"
+    title = f"{_UNMEASURED}{'; laws that fit as well differ by' * apart}"
     blocks = Errors(_title(answer), (_INSIDE, "beyond"), measured), Errors(title, heads, by_law)
     return [one for one in blocks if one.rows]
 
 
 _INSIDE = "in\N{NO-BREAK SPACE}range"
-_NOT_COMPARED, _TWICE = "Not compared with data", "at twice the highest rate"
+_UNMEASURED, _TWICE = "No measurement", "at twice the highest rate"
 
 
 def _title(answer: Any) -> str:

@@ -102,7 +102,7 @@ def table(answer: Any) -> tuple[list[str], list[list[str]]]:
 def of_which_added(answer: Any) -> str:
     """Return how many modes were declared and how many added, in brackets; empty without these."""
     added = sum(is_added(answer, one) for one in answer.modes)
-    return f" ({len(answer.modes) - added} declared, {added} added)" if added else ""
+    return f" ({len(answer.modes) - added} given, {added} added)" if added else ""
 
 
 def is_added(answer: Any, mode: Any) -> bool:

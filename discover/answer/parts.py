@@ -22,6 +22,7 @@ class Suspect:
 
     effect: str  # name as studies spell it
     constants: tuple[Constant, ...] = ()  # its constants with their intervals, the amplitude first
+    correction: float = 0.0  # by how much it changes a fitted run at most, relative
 
     @property
     def amplitude(self) -> Constant | None:

@@ -138,10 +138,10 @@ def description(answer: Any, brief: int = 0) -> str:
         said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-        ends = "new runs may average " if _is_too_rough(answer) else f"{_LEVEL}{low}–"
-        size = f"{percent_of(found.size)}{f' ({ends}{high} %)' * (low != high and brief < 3)}"
+        ends = f"{low}–{high} %" * (low != high and brief < 3)
         # of fitted runs it is no error that a prediction could have
-        said = _of_unseen(answer, size, brief) if found.unseen else _OF_FITTED + size
+        size = f"{percent_of(found.size)}{f' ({_LEVEL}{ends})' * bool(ends)}"
+        said = _of_unseen(answer, ends, brief) if found.unseen else _OF_FITTED + size
     parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
     return f"{'; '.join(filter(None, parts))}." if said else ""
 
@@ -154,24 +154,27 @@ def noise_of(answer: Any) -> str:
 _OF_FITTED = "Residual of the fitted runs "
 
 
-def _of_unseen(answer: Any, size: str, brief: int) -> str:
+def _of_unseen(answer: Any, ends: str, brief: int) -> str:
     """Return mean errors of unseen runs: of each quantity where several were measured, or of all.
 
-    And the worst of these, where one misses the tolerance and the range does not say it.
+    And the worst of these, where one misses the tolerance and the range does not say it. `ends`:
+    between which the mean of many runs may lie, which those few at hand may not reach.
     """
     each = [
         f"{symbol} {at_most(one.inside)}"
         for name, symbol in SYMBOLS.items()
         if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
     ]
-    told = each if len(each) > 1 else [size]
+    told = each if len(each) > 1 else [percent_of(answer.discrepancy.size)]
     worst = None if brief > 1 or answer.discrepancy.met_up_to else worst_run(answer)
     if worst is not None and len(each) > 1 and answer.range.flows == ("shear",):  # a run of σ12
         told = [f"{each[0]} (worst run {worst[1]})", *each[1:]]
     elif worst is not None:
         told = [*told, f"worst run {worst[1]}"]
     rough = f"Too rough for {percent_of(answer.tolerance)}; m" if _is_too_rough(answer) else "M"
-    return f"{rough}ean error on {answer.discrepancy.unseen}: {', '.join(told)}"
+    many = f" (many runs may average {ends})" * (bool(ends) and len(each) < 2)
+    unseen = answer.discrepancy.unseen if len(each) < 2 else "unseen data"
+    return f"{rough}ean error on {unseen}: {', '.join(told)}{many}"
 
 
 def _is_too_rough(answer: Any) -> bool:
@@ -182,7 +185,10 @@ def _is_too_rough(answer: Any) -> bool:
 
 def _corrected(answer: Any, brief: int) -> str:
     """Return what of the instrument the errors allow for; empty where nothing."""
-    names = [effect_title(one.effect) for one in answer.suspects if brief < 4]
+    names = [
+        f"{effect_title(one.effect)}{f' (≤ {percent_of(one.correction)})' * bool(one.correction)}"
+        for one in answer.suspects[: None if brief < 4 else 0]
+    ]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
     told = listed(names) if few else f"{len(names)} measurement errors"
     # no instrument shapes what is measured in extension
@@ -255,7 +261,7 @@ def where(answer: Any) -> str:
     use, ends = "Otherwise use" if _is_too_rough(answer) else "Use", ""
     met, worst = answer.discrepancy and answer.discrepancy.met_up_to, worst_run(answer)
     if met and worst is not None:
-        ends = f": within {percent_of(answer.tolerance)} up to {met}, {worst[1]} above"
+        ends = f": tolerance {percent_of(answer.tolerance)} met up to {met}, not above ({worst[1]})"
     return f"{'; '.join([f'{use} for {listed(quantities)}{only}, {place}{ends}', *implied])}."
 
 

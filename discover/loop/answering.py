@@ -29,7 +29,6 @@ from discover.loop.sentences import (
     untested_by,
     what_to_measure_next,
 )
-from discover.statistics.residual import fast_part
 from discover.words import effect_title, effects_title, listed, percent_of, readable, significant
 
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
@@ -82,7 +81,10 @@ def loop_answer(result: Any) -> Answer:
         following,
         (
             *(_of_function(one) for one in result.free_form if one.in_answer),
-            *(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
+            *(
+                Suspect(one.effect, _of_stage(result, one), result.corrections.get(one.effect, 0.0))
+                for one in suspected(result)
+            ),
         ),
         failed=_failed(result),
         alternative=_alternative(result),
@@ -102,10 +104,13 @@ def loop_answer(result: Any) -> Answer:
 
 
 def _scatter(records: Sequence[RunRecord]) -> str:
-    """Return the scatter of recorded stresses, in words; empty where none has one."""
-    found = [fast_part(record.measured) for record in records if record.quantity != "strain"]
-    found = [one for one in found if one > 0.0]
-    return f" of {modes.span((min(found), max(found)))} Pa rms" if found else ""
+    """Return the scatter of recorded stresses, and what hides in it; empty where none has one."""
+    own = [one for one in records if one.quantity != "strain" and one.scatter > 0.0]
+    if not own:
+        return ""
+    noise = modes.span((min(one.scatter for one in own), max(one.scatter for one in own)))
+    most = modes.short(max(one.mean_below for one in own))
+    return f" of {noise} Pa rms; a fluid's mean stress is below {most} Pa (95 %)"
 
 
 def _falls_above(result: Any) -> str:
@@ -358,6 +363,8 @@ def _constants(
                 () if by_mode is None else tuple((m.value, not m.left_open) for m in by_mode.modes),
             )
         )  # fmt: skip
+    if effect and found and found[0].may_be_zero:  # an effect that may be absent has no others
+        found[1:] = [replace(one, determined=False) for one in found[1:]]
     return tuple(found)
 
 

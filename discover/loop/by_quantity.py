@@ -12,6 +12,7 @@ from discover.answer.modes_in_words import degrees, span
 from discover.loop.fitted_range import as_measured, by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
+from discover.statistics.noise.noise_model import rms
 from discover.words import counted, listed, percent_of, significant
 
 BEYOND = 2.0
@@ -108,7 +109,7 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
-        own = measured(result.records, kind, result.noise_floor)
+        own = measured(result, kind)
         unseen = {} if own is None else unseen_errors(result, kind)
         if own is not None and (inside := _mean([*unseen.values()])) is not None:
             note = counted(len(unseen), "unseen run")
@@ -124,8 +125,8 @@ def _by_law(result: Any, kind: str) -> ExpectedError:
     """
     apart, limit = differing(result, kind), _WORTH_SAYING if kind == "N2" else _APART
     ends = _spread(result, kind)
-    recorded = kind == "N1" and any(record.has_normal_stress for record in result.records)
-    unused = "measured but not used" if recorded else None
+    there = kind == "N1" and any(record.has_normal_stress for record in result.records)
+    unused = "measured but not used" if there else None  # no sample of it is sound
     if kind == "N1" and normal_stress_settled(result):
         return ExpectedError(*ends, note=unused or "", is_measured=False, spread=ends)
     if apart is not None and (apart >= limit or kind == "N1"):
@@ -138,8 +139,7 @@ def _by_law(result: Any, kind: str) -> ExpectedError:
         at = as_measured([r for r in result.records if not r.held_out], found.over_n1_rate)
         share = f"N2/N1 ≈ {significant(found.over_n1, 2)} at {at}"
         return ExpectedError(note=f"{'0' if abs(found.over_n1) < _NOTHING else share} by this law")
-    spread = ends if apart and apart > _WORTH_SAYING else (None, None)
-    return ExpectedError(missing=unused or "not measured", spread=spread)
+    return ExpectedError(missing=unused or "not measured", spread=ends)
 
 
 _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
@@ -179,7 +179,7 @@ def of_stress(result: Any) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
     errors = unseen_errors(result, "sigma12")
     inside = _mean([*errors.values()])
-    own = measured(result.records, "sigma12", result.noise_floor) or ExpectedError()
+    own = measured(result, "sigma12") or ExpectedError()
     beyond, at, spread = own.beyond, own.beyond_at, (None, None)
     if beyond is None and (apart := _spread(result, "sigma12")[1]) is not None:
         beyond, spread = apart, (None, apart)
@@ -190,11 +190,9 @@ def of_stress(result: Any) -> ExpectedError:
     return ExpectedError(inside, beyond, at, note=note, spread=spread)
 
 
-def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
-    """Return the error of what was measured, of unseen runs if there are any; None without.
-
-    `noise`: relative, which is subtracted.
-    """
+def measured(result: Any, kind: str) -> ExpectedError | None:
+    """Return the error of what was measured, of unseen runs if there are any; None without."""
+    records, noise = (*result.records, *result.unfitted), result.noise_floor
     own = [record for record in records if _is(record, kind)]
     if not own:
         return None
@@ -203,13 +201,21 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
     fast = [r for r in held if r.fastest > FASTER * fastest]
     slow = [r for r in (held or own) if r.fastest <= FASTER * fastest]
     inside, beyond = (
-        _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
+        _mean([beyond_noise(float(r.errors[-1]), _noise(r, noise)) for r in some])
+        for some in (slow, fast)
     )
-    note = _FITTED if not held else _UNSEEN if len(held) < len(own) else "not fitted"
+    unfitted = "neither fitted nor corrected for axial compliance" if kind == "N1" else "not fitted"
+    note = _FITTED if not held else _UNSEEN if len(held) < len(own) else unfitted
     if held and slow:
         note = f"{counted(len(slow), 'run')} at {_rates([r.unshifted for r in slow])}, {note}"
     at = _measured_at(fast, [r for r in records if not r.held_out])
     return ExpectedError(inside, beyond, at, note=note, is_residual=not held)
+
+
+def _noise(record: RunRecord, noise: float | None) -> float | None:
+    """Return the noise of a record: of a force that no fit saw its own, which no floor holds."""
+    own = record.held_out and record.quantity in ("N1", "N2")
+    return record.scatter / (rms(record.measured) or 1.0) if own else noise
 
 
 def _measured_at(fast: Sequence[RunRecord], fitted: Sequence[RunRecord]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
@@ -162,6 +163,16 @@ class Ended(Path):
             return missed
         # what the fit takes for noise is not all noise here
         return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - self.noise**2, 0.0))
+
+    def corrections(self) -> dict[str, float]:
+        """By how much each effect of the instrument changes the run that it changes most."""
+        rows, problem, found = self.posterior.problem.fitted, self.posterior.problem, {}
+        for name in self.fit.names:
+            if problem.effects[name].kind != "constitutive":
+                off = replace(self.fit, theta=problem.without(self.fit.theta, name))
+                change = self.predicted(self.fit, rows, False) - self.predicted(off, rows, False)
+                found[name] = float(np.max(rows.rms_by_run(change[rows.seen] / rows.size)))
+        return found
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
@@ -340,8 +351,9 @@ def result_of(
     laws: tuple[LawFit, ...],
     spikes: Mapping[str, Sequence[float]],
     of_rates: str,
+    unfitted: Sequence[Run] = (),
 ) -> LoopResult:
-    """Return the result of a loop; `spikes`, `of_rates` as `Task` has them.
+    """Return the result of a loop; `spikes`, `of_rates`, `unfitted` as `Task` has them.
 
     `laws`: those that the declared one was chosen from.
     """
@@ -372,6 +384,7 @@ def result_of(
         remaining=ended.remaining(spikes, of_rates),
         rankings=ended.rankings(),
         records=tuple(ended.records),
+        unfitted=() if ended.without_fluid else tuple(ended.records_of_unfitted(unfitted)),
         declared_parameters=own | of_law,
         declared_effects=final_model.declared_effects(model, theta, free, by_mode),
         declared_law=final_model.declared_law(declared, theta, of_law),
@@ -382,6 +395,7 @@ def result_of(
         discrepancy=ended.discrepancy,
         spread_of_laws=spread,
         left_out=ended.left_out,
+        corrections=ended.corrections(),
         nearest_law=ended.posterior.memory.get("named"),
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,

@@ -248,7 +248,7 @@ class Found:
         """Return the result of a closed loop."""
         task, ended = self.task, self.ended(explanations)
         lines = task.lines(self.tried) if self.tried else ()
-        return result_of(ended, lines, task.spikes, task.of_rates)
+        return result_of(ended, lines, task.spikes, task.of_rates, task.unfitted)
 
 
 def search(task: Task, laws: Sequence[str] = ()) -> Found:

@@ -43,7 +43,8 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     augmented model. `noise_floor`: relative noise, mean over the fitted runs. `stages`: effects
     added, in order. `remaining`: the residual, and whether it is systematic. `rankings`: candidates
     at each stage, and those that earned nothing at the last. `records`: every run with its
-    predictions. `declared_parameters`: what was fitted of the declared model: modulus in Pa and
+    predictions. `unfitted`: what else they recorded. `corrections`: by how much each effect of the
+    instrument changes a run at most. `declared_parameters`: of the declared law: modulus in Pa and
     relaxation time in s, or for several modes a common factor on each, and parameters of the law;
     those that may differ from mode to mode are a `ConstantByMode`. `declared_effects`: effects that
     were part of the declared model, and so are no finding. `declared_law`: the declared law with
@@ -77,6 +78,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     remaining: dict[str, Any]
     rankings: tuple[tuple[parts.CandidateScore, ...], ...] = field(repr=False, default=())
     records: tuple[RunRecord, ...] = field(repr=False, default=())
+    unfitted: tuple[RunRecord, ...] = field(repr=False, default=())
     declared_parameters: dict[str, parts.StageParameter] = field(default_factory=dict)
     declared_effects: tuple[parts.DeclaredEffect, ...] = ()
     declared_law: Equation | None = field(repr=False, default=None)
@@ -90,6 +92,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out: Mapping[str, float] = field(default_factory=dict)
+    corrections: Mapping[str, float] = field(default_factory=dict)
     nearest_law: parts.NearestLaw | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
+from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.inference.engine import Indistinguishable, Posterior
 from discover.inference.engine.bands import quantiles
@@ -141,6 +142,11 @@ class Path:
         theta = self.theta_ahead(fit) if held_out else fit.theta
         fitter = self.posterior.fitter_of(fit)
         return predicted(fitter, replace(fit, theta=theta), rows)
+
+    def records_of_unfitted(self, runs: Sequence[Run]) -> list[RunRecord]:
+        """Return what else runs recorded with its prediction, which no fit has seen."""
+        found = self.predicted(self.fit, Rows.of(runs), True) if runs else np.empty((0, 0))
+        return record_runs(runs, found[None], True)
 
     def declared_predicted(self, rows: Rows) -> Float[np.ndarray, "runs n"]:
         """Return what the declared model predicts, its constants as fitted and the bench ideal."""

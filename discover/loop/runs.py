@@ -17,7 +17,7 @@ from discover.loop.parts import ErrorPair
 from discover.protocols import strains
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise.noise_model import independent_samples, rms
 from discover.statistics.residual import fast_part
 from discover.words import counted
 
@@ -73,6 +73,15 @@ def split_runs(
             yield thin_run(left, _needed(left, most))
 
     return list(prepared(fitted.runs)), list(prepared(held.runs)), spikes
+
+
+def unfitted_runs(dataset: Dataset, runs: Sequence[Run]) -> list[Run]:
+    """Return N1 and N2 that runs recorded besides, without samples that no fluid can have."""
+    sound = {run.name: run.time for run in dataset.quantity_by_quantity()}
+    found = [run.observing(quantity) for run in runs for quantity in run.beside]
+    found = [one for one in found if one.name in sound.keys() - {run.name for run in runs}]
+    found = [one.window(np.isin(one.time, sound[one.name])) for one in found]
+    return [one for one in found if len(one) >= FEWEST_SAMPLES]
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
@@ -192,6 +201,17 @@ class RunRecord:
     def fastest(self) -> float:
         """Largest rate, in 1/s."""
         return float(np.max(np.abs(self.rate)))
+
+    @property
+    def scatter(self) -> float:
+        """Deviation of what changes from sample to sample, at most that about the mean."""
+        return min(fast_part(self.measured), float(np.std(self.measured)))
+
+    @property
+    def mean_below(self) -> float:
+        """Bound below which the mean of the record lies, without its sign, with 95 % (normal)."""
+        off = self.measured - (mean := float(np.mean(self.measured)))
+        return abs(mean) + 1.645 * float(np.std(off)) / independent_samples(off) ** 0.5
 
     @property
     def shift(self) -> float:

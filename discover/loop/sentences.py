@@ -6,7 +6,7 @@ from typing import Any
 from discover import words
 from discover.answer import Constant
 from discover.answer.modes_in_words import reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, at_most, differ
+from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, differ
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.fitted_range import as_measured
@@ -81,14 +81,15 @@ def what_to_measure_next(result: Any) -> str:
         return told
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
+    if told := next((_CHECKS[one.slot] for one in result.free_form if one.in_answer), ""):
+        return told.format(**_extreme(result))
+    if first := _of_unfitted(result):
+        then = _as_clause(_of_another_stress(result)).partition(" at ")[0]
+        return f"{first}{'; then ' * bool(then)}{then}."
     if result.verdict == "unexplained":
-        if told := next((_CHECKS[one.slot] for one in result.free_form if one.in_answer), ""):
-            return told
         if own := suspected(result):  # of the instrument
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
-        then = _of_another_stress(result) or _by_geometry(result)
-        first, what = _of_unfitted(result), _as_clause(then).partition(": ")[0]
-        return f"{first}; then {what}." if first else then
+        return _of_another_stress(result) or _by_geometry(result)
     # the stage to confirm first: one with aliases before one without
     with_aliases = [stage for stage in result.stages if stage.aliases]
     doubtful = next(iter([*with_aliases, *result.stages]), None)
@@ -104,30 +105,38 @@ def what_to_measure_next(result: Any) -> str:
 
 
 _CHECKS = {
-    "recorded_stress": "Repeat the run of the largest stress with a smaller plate or cone.",
+    "recorded_stress": "Repeat {strongest} with a smaller plate or cone.",
     "drift": "Record the stress before the flow starts and after it ends.",
-    "response": "Repeat the fastest run at a tenth of its rate.",
-    "slip": "Repeat the run of the largest stress with another gap.",
+    "response": "Repeat {fastest} at a tenth of its rate.",
+    "slip": "Repeat {strongest} with another gap.",
 }
+
+
+def _extreme(result: Any) -> dict[str, str]:
+    """Return the names of the fitted runs of the largest stress and of the largest rate."""
+    own = [r for r in result.records if not r.held_out and r.quantity not in ("N1", "N2")]
+    strongest = max(own, key=lambda one: float(abs(one.measured).max()))
+    return {"strongest": strongest.name, "fastest": max(own, key=lambda one: one.fastest).name}
 
 
 def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            share = Constant(name, one.value, one.ci95).measured(f"{words.LEVEL} ")
-            shifted = f"its {OF_SWEEP[name]} are {share} times the sweep's"
-            return f"Repeat the frequency sweep on this loading: {shifted}."
+            fits = f"{Constant(name, one.value, one.ci95).interval} times its {OF_SWEEP[name]}"
+            return f"Repeat the frequency sweep on the loading of these runs, which fit {fits}."
     return ""
 
 
 def _of_unfitted(result: Any) -> str:
-    """Return what was measured in another flow, not fitted and missed; empty where nothing."""
-    found = measured(result.records, "uniaxial", result.noise_floor)
-    missed = (0.0 if found is None else found.inside) or 0.0
-    fitted = any(r.flow == "uniaxial" and not r.held_out for r in result.records)
-    by = f"which this law misses by {at_most(missed)}"
-    return "" if fitted or missed <= result.tolerance else f"Fit {SYMBOLS['uniaxial']} too, {by}"
+    """Return what was measured besides, not fitted and missed; empty where nothing."""
+    for kind in ("uniaxial", "N1"):
+        found = measured(result, kind)
+        missed = (0.0 if found is None else found.inside) or 0.0
+        fitted = any(kind in (r.flow, r.quantity) and not r.held_out for r in result.records)
+        if missed > result.tolerance and not fitted:
+            return f"Fit the recorded {SYMBOLS[kind]} too"
+    return ""
 
 
 def _fastest(records: Sequence[RunRecord]) -> str:
@@ -153,7 +162,7 @@ def _of_another_stress(result: Any) -> str:
         apart = differing(result, kind)
         if apart is None or not result.tolerance < apart <= MUCH:
             continue
-        if _is_in_reach(result, kind):
+        if measured(result, kind) is None and _is_in_reach(result, kind):
             apart_by = f"equally good laws differ by {words.percent_of(apart)}"
             return f"{title} at {_fastest(_sheared(result))}: {apart_by}."
     return ""
@@ -161,7 +170,8 @@ def _of_another_stress(result: Any) -> str:
 
 def _of_predicted_n1(result: Any) -> str:
     """Return that N1 tests a law which predicts it; empty where it does not, or no one can."""
-    if not normal_stress_settled(result) or not _is_in_reach(result, "N1"):
+    fitted = any(record.quantity == "N1" for record in result.records)
+    if fitted or not normal_stress_settled(result) or not _is_in_reach(result, "N1"):
         return ""
     if any(record.has_normal_stress for record in result.records):
         return "Fit N1 too, which runs recorded: the law predicts it, and observe leaves it out."
@@ -173,9 +183,8 @@ def _sheared(result: Any) -> list[RunRecord]:
 
 
 def _is_in_reach(result: Any, kind: str) -> bool:
-    """Return whether a stress that nobody measured yet can be, at the fastest fitted rate."""
-    shear = _sheared(result)
-    if not shear or measured(result.records, kind, None) is not None:
+    """Return whether a stress can be measured, at the fastest fitted rate."""
+    if not (shear := _sheared(result)):
         return False
     rate = max(record.unshifted.fastest for record in shear)
     stress = result.spread_of_laws[kind].stress

@@ -29,7 +29,7 @@ from discover.laws.registry import starting_values
 from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
-from discover.loop.runs import MOST_SAMPLES, errors_of, require_samples, split_runs
+from discover.loop.runs import MOST_SAMPLES, errors_of, require_samples, split_runs, unfitted_runs
 from discover.words import unknown_name
 
 Say = Callable[[str], None]
@@ -50,7 +50,7 @@ class Task:
     there are none. `most`: largest number of effects. `say`: called with a line of text now and
     then. `computed`: whether runs were computed: they know no instrument, a sound one either.
     `spikes`: times of samples set aside as outliers, by run. `of_rates`: that rates were read with
-    noise which the fluid did not feel; empty where not.
+    noise which the fluid did not feel; empty where not. `unfitted`: their N1 and N2 besides.
     """
 
     declared: DeclaredModel
@@ -64,6 +64,7 @@ class Task:
     computed: bool = False
     spikes: Mapping[str, Sequence[float]] = field(default_factory=dict)
     of_rates: str = ""
+    unfitted: Sequence[Run] = ()
 
     @classmethod
     def of_runs(
@@ -97,6 +98,7 @@ class Task:
         return cls(
             declared, candidates, fitted, held, noise, loading or 0.0, max_effects,
             progress or (lambda line: None), computed, spikes, of_rates,
+            unfitted_runs(dataset, [*fitted, *held]),
         )  # fmt: skip
 
     def problem(

@@ -35,7 +35,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             if one.is_term:
                 symbols[i] = one.symbol.replace("σ", "τ")
                 headline = headline.replace(one.symbol, symbols[i])
-    ends = answer.range.rate_1_s
+    ends, doubts = answer.range.rate_1_s, answer.suspects or sentences.worst_run(answer)
     shifts = [
         (modes.degrees(at), words.significant(one, 3),
          modes.span((ends[0] / one, ends[1] / one)) if ends else "–")
@@ -49,7 +49,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "headline": headline,
         "quality": quality,
         "fitted": _fitted(answer),
-        "open": not answer.title or answer.adequate is False or bool(sentences.worst_run(answer)),
+        "open": not (answer.title and answer.adequate is not False and not doubts),
         "law": _typeset(answer),
         "constants": [
             (symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
@@ -68,13 +68,14 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 
 
 def _fitted(answer: Answer) -> str:
-    """Return in which flows constants were fitted, and at which temperature times hold."""
+    """Return in which flows constants were fitted, where, and at which temperature times hold."""
     if not any(one.ci95 for one in answer.constants):
         return ""
     at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
     for used, factor in answer.shift_factors.items():
         if [*answer.range.by_temperature] == [used]:
-            at += f", {modes.shortened(factor)} at {modes.degrees(used)}"
+            there = f" at {modes.degrees(used)}"
+            at = f"{there}{at}, {modes.shortened(factor)}{there}"
     return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
 
 
@@ -82,7 +83,8 @@ def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is possible."""
     end = "at its physical limit" * one.at_limit
     absent = "may be infinite, without effect" * one.may_be_absent
-    return "; ".join(filter(None, [one.said, end, sentences.POORLY * one.is_poor, absent]))
+    poor = sentences.POORLY * (one.is_poor and one.determined)
+    return "; ".join(filter(None, [one.said, end, poor, absent]))
 
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
@@ -91,7 +93,8 @@ def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
     if one.amplitude is None or not has_size:
         return title, "", "" if has_size else sentences.NOT_SEPARABLE, ""
     said = one.amplitude.meaning if one.amplitude.unit == "%" else ""
-    said = said if one.is_established else "; ".join(filter(None, [said, "may be zero"]))
+    most = f"changes a run by up to {words.percent_of(one.correction)}" * bool(one.correction)
+    said = "; ".join(filter(None, [said, most, "may be zero" * (not one.is_established)]))
     return title, said, in_cell(one.amplitude.number), in_cell(one.amplitude.interval)
 
 

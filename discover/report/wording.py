@@ -166,6 +166,7 @@ def subscripts(text: str) -> Markup:
 _EXPLAINED = {
     "Wi": "Weissenberg number: mean relaxation time λ times the largest shear rate",
     "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
+    "unseen data": "what no fit used: runs left out, or another quantity of a run",
     "unseen runs": "runs that a fit did not use: held out, or left out in turn",
 }
 
@@ -176,7 +177,9 @@ def explained(text: str) -> Markup:
     def said(found: re.Match[str]) -> str:
         return f'<abbr title="{_EXPLAINED[found[0]]}">{found[0]}</abbr>'
 
-    return Markup(re.sub(r"\b(?:(?:Wi|De)(?=\s=)|unseen runs)", said, str(subscripts(text))))
+    return Markup(
+        re.sub(r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data))", said, str(subscripts(text)))
+    )
 
 
 def in_cell(text: str) -> str:

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel
-from discover.loop.answering import shows_a_derivative
+from discover.loop.answering import _constants, shows_a_derivative
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread, falls_above
 from discover.loop.fitted_range import range_of
@@ -39,7 +39,7 @@ def result(records, left=0.06, **more):
         "spread_of_laws": {"N1": Spread(0.6, 0.8), "uniaxial": Spread(1.2, 1.3)},
         "verdict": "unexplained", "material": None, "stages": (), "tolerance": 0.05,
         "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
-        "remaining": {}, "declared_parameters": {}, "free_form": (),
+        "remaining": {}, "declared_parameters": {}, "free_form": (), "unfitted": (),
     }  # fmt: skip
     return SimpleNamespace(**(found | more))
 
@@ -191,13 +191,13 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
 
 def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
     factor = StageParameter(0.52, (0.04, 0.79), "1")
-    again = "Repeat the frequency sweep on this loading: its "
+    again = "Repeat the frequency sweep on the loading of these runs, which fit "
     for name, what in (
         ("modulus_factor", "moduli"),
         ("relaxation_time_factor", "relaxation times"),
     ):
         assert what_to_measure_next(close(declared_parameters={name: factor})) == (
-            f"{again}{what} are 0.52 (95 % CI 0.04–0.79) times the sweep's."
+            f"{again}0.04–0.79 times its {what}."
         )
     # the first is next to one, within the tolerance of 10 %, and the last is no value
     for ends in ((0.5, 0.92), (0.4, 1.1), (0.001, 60.0)):
@@ -287,12 +287,43 @@ def test_what_was_measured_and_missed_but_not_fitted_is_fitted_next():
     found = close([*FITTED, replace(held, flow="uniaxial")])
     assert errors_by_quantity(found)["uniaxial"].note == "1 run at 0.3 1/s, not fitted"
     told = what_to_measure_next(found)
-    missed = "Fit uniaxial extension too, which this law misses by 50 %"
-    assert told == f"{missed}; then measure N1 at 1 1/s."
+    assert told == "Fit the recorded uniaxial extension too; then measure N1."
     found.tolerance = 0.55
     assert what_to_measure_next(found).startswith("Measure N1")
     both = replace(held, flow="uniaxial", held_out=False)
     assert not what_to_measure_next(close([*FITTED, both])).startswith("Fit")
+
+
+def test_a_normal_stress_that_runs_recorded_and_no_fit_saw_is_compared():
+    normal = record("slow (N1)", 0.1, 0.4, held_out=True, quantity="N1")
+    found = close(FITTED, unfitted=(normal,))
+    told = errors_by_quantity(found)["N1"]
+    assert told.inside == 0.4  # constant: no noise of its own, and none of σ12 is subtracted
+    assert told.is_measured
+    assert told.note == "1 run at 0.1 1/s, neither fitted nor corrected for axial compliance"
+    assert what_to_measure_next(found).startswith("Fit the recorded N1 too; then measure uniaxial")
+    fast = replace(normal, rate=3.0 + normal.rate)
+    assert errors_by_quantity(close(FITTED, unfitted=(normal, fast)))["N1"].beyond == 0.4
+    # samples that scatter by 0.4 hold nothing else
+    lot = np.random.default_rng(0)
+    measured = 1.0 + 0.4 * lot.standard_normal(400)
+    size = 0.4 / np.hypot(1.0, 0.4)  # over the root mean square
+    noisy = replace(normal, measured=measured, errors=np.array([size]))
+    # 400 samples tell their scatter to some 5 %: sqrt(2 × 0.05) of it is left at most
+    assert errors_by_quantity(close(FITTED, unfitted=(noisy,)))["N1"].inside < 0.32 * 0.4
+
+
+def test_constants_of_an_effect_that_may_be_absent_are_not_determined():
+    two = {
+        "inverse_critical_stress": StageParameter(5.2, (0.0, 13.9), "1/Pa"),
+        "build_up_time": StageParameter(1.0, (0.6, 1.6), "s"),
+    }
+    name = "thixotropic_relaxation_by_stress"
+    first, second = _constants(two, (), name)
+    assert first.may_be_absent
+    assert not second.determined
+    two["inverse_critical_stress"] = StageParameter(5.2, (1.0, 13.9), "1/Pa")
+    assert all(one.determined for one in _constants(two, (), name))
 
 
 @pytest.mark.parametrize("alpha", [0.49, 0.7])

@@ -26,7 +26,7 @@ from tensor_library.law_terms import LawTerm
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
         "Linear PTT, ε = 0.82 (95 % CI 0.58–1.07), 2 modes. Too rough for 5 %; mean error on "
-        "unseen runs: 6 % (new runs may average 7 %), worst run 8 %, allowing for stress gain. "
+        "unseen runs: 6 %, worst run 8 % (many runs may average 4–7 %), allowing for stress gain. "
         "Otherwise use for σ12 only, 0.003–3 1/s."
     )
     useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
@@ -34,7 +34,7 @@ def test_the_first_line_has_law_constants_error_and_range():
     # the worst run is said once: with the range up to which each run meets the tolerance
     up_to = replace(MELT, discrepancy=replace(MELT.discrepancy, met_up_to="1 1/s")).headline
     assert "worst" not in up_to
-    assert "within 5 % up to 1 1/s, 8 % above" in up_to
+    assert "tolerance 5 % met up to 1 1/s, not above (8 %)" in up_to
     one_frequency = replace(MELT.range, frequency_rad_s=(1.0, 1.0))
     assert "3 1/s, oscillating at 1 rad/s." in replace(MELT, range=one_frequency).headline
     swings = replace(one_frequency, amplitude=(0.1, 0.8))
@@ -148,7 +148,7 @@ def test_slow_oscillation_is_a_range_that_holds_steady_shear(slowest, said):
 def test_a_mean_error_says_how_large_it_may_be_over_new_runs():
     assert MELT.discrepancy is not None
     wide = replace(MELT, discrepancy=replace(MELT.discrepancy, ci95=(0.04, 0.12)))
-    assert "6 % (new runs may average 12 %), worst run 8 %" in wide.headline
+    assert "6 %, worst run 8 % (many runs may average 4–12 %)" in wide.headline
 
 
 @pytest.mark.parametrize("given", [0.0, -0.1, 2.0])
@@ -300,18 +300,19 @@ def test_a_maxwell_fluid_with_a_structure_is_thixotropic_only_where_runs_show_re
 def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_has_the_worst_run():
     errors = {**MELT.expected_error, "uniaxial": ExpectedError(0.17, note="unseen runs")}
     told = replace(MELT, expected_error=errors).headline
-    assert "runs: σ12 6 % (worst run 8 %), uniaxial extension 17 %, allowing for" in told
+    assert "data: σ12 6 % (worst run 8 %), uniaxial extension 17 %, allowing for" in told
     both = replace(MELT.range, flows=("shear", "uniaxial"))  # the worst may be either
     told = replace(MELT, expected_error=errors, range=both).headline
     assert (
-        "runs: σ12 6 %, uniaxial extension 17 %, worst run 8 %, allowing for stress gain in shear"
+        "data: σ12 6 %, uniaxial extension 17 %, worst run 8 %, allowing for stress gain in shear"
         in told
     )
     # not of what the law alone says, nor of fitted runs
     for other in ({"is_measured": False}, {"is_residual": True}):
         same = {**errors, "uniaxial": replace(errors["uniaxial"], **other)}
         assert (
-            "runs: 6 % (new runs may average 7 %)," in replace(MELT, expected_error=same).headline
+            "runs: 6 %, worst run 8 % (many runs may average 4–7 %),"
+            in replace(MELT, expected_error=same).headline
         )
     assert "worst" not in replace(MELT, tolerance=0.1).headline
 
@@ -334,7 +335,7 @@ def test_a_constant_that_differs_from_mode_to_mode_is_a_range_over_them():
     added = Constant("relaxation_mode.G", 100.0, (30.0, 300.0), "Pa", letter="G_+")
     fit = replace(fit, constants=(added,))
     assert "1 constant (1 poorly determined), 2 modes." in fit.headline
-    assert of_which_added(fit) == " (1 declared, 1 added)"
+    assert of_which_added(fit) == " (1 given, 1 added)"
     assert not of_which_added(MELT)
     assert [row[0] for row in table(fit)[1]] == ["1", "2 (added)"]
 

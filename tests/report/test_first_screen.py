@@ -203,7 +203,7 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
     up_to = replace(runs, met_up_to="0.3 1/s")
     one_range = replace(MELT, discrepancy=up_to)  # and not a second one with the tolerance
     assert not tolerance(one_range)
-    assert "Use for σ12 only, 0.003–3 1/s: within 5 % up to 0.3 1/s, 9 % above." in (
+    assert "Use for σ12 only, 0.003–3 1/s: tolerance 5 % met up to 0.3 1/s, not above (9 %)." in (
         one_range.headline
     )
     assert answer_screen(several)["expected"][0].rows[-1].note == "b"
@@ -226,7 +226,7 @@ def test_constants_far_from_the_middle_of_their_intervals_are_a_set():
     assert note in render("answer.html", screen=answer_screen(pair))
     assert note not in render("answer.html", screen=answer_screen(replace(pair, constants=(even,))))
     one = replace(pair, constants=(even,))  # which holds only if its law is the right one
-    condition = "95 % CI,<br>if this law is right</th>"
+    condition = "95 % CI<br>within this law</th>"
     assert condition in render("answer.html", screen=answer_screen(one))
     right = replace(one, fits_to_the_noise=True)
     assert condition not in render("answer.html", screen=answer_screen(right))
@@ -259,7 +259,9 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     assert "modes at −35 °C: G" in render("answer.html", screen=screen)
     hot = replace(shifted, range=replace(MELT.range, by_temperature={-10.0: MELT.range}))
     told = answer_screen(hot)["fitted"]
-    assert told == " (fitted in shear; times at −35 °C, shorter by a factor of 131 at −10 °C)"
+    assert told == (
+        " (fitted in shear at −10 °C; times at −35 °C, shorter by a factor of 131 at −10 °C)"
+    )
     cold = replace(shifted, shift_factors={-50.0: 20.0})
     assert any("times are longer by a factor of 20 at −50 °C" in line for line in cold.lines)
     clock = "times on the instrument's clock"  # which is not shifted
@@ -343,7 +345,7 @@ def test_quantities_that_nothing_is_known_of_share_a_row():
     ]  # fmt: skip
     page = render("answer.html", screen=answer_screen(fluid))
     table = page[page.index('<table id="answer-table">') : page.index("</table>")]
-    assert table.count('class="both">not measured') == 1
+    assert table.count('class="both">untested') == 1
     apart = {"N1": replace(none, note="0 by this law"), "N2": none}  # for reasons of their own
     assert len(answer_screen(replace(fluid, expected_error=apart))["expected"][1].rows) == 3
 
