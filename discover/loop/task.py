@@ -22,7 +22,7 @@ from discover.forward import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem
 from discover.inference.engine.fits import Fitter
-from discover.inference.engine.posterior import posterior_of
+from discover.inference.engine.posterior import by_all_runs, near_the_likeliest, posterior_of
 from discover.inference.engine.search import Search, without_by_mode
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
@@ -138,24 +138,28 @@ class Task:
         """Return the posterior over what a declared model lacks.
 
         With constants that differ from mode to mode if it is then likelier: of a model with several
-        modes, those that it declares so, or else what was found and may differ. Raises InputError
+        modes, those that it declares so, or else what is possible and may differ. Raises InputError
         as `searched`.
         """
         first = self.searched(declared)
         posterior = posterior_of(first)
         if len(declared.modulus) < 2 or not posterior.explanations:
             return posterior
-        names = ()
+        names, whole = (), posterior.memory["whole"][0]
         if not declared.by_mode:
-            found = posterior.explanations[0].members[0]
+            # also what is less likely with one constant for all: that may be why
+            some = [*near_the_likeliest(whole), *near_the_likeliest(first)]
+            found = dict.fromkeys(name for fit in some for name in fit.names)
             names = tuple(n for n in found if may_differ_by_mode(first.problem.effects[n]))
             if not names:
                 return posterior
         self.say("constants that may differ from mode to mode")
         second = self.searched(replace(declared, by_mode=names), first)
-        gain = 2.0 * (log_evidence(second) - log_evidence(first))
+        # by all runs, as the verdict is: those held out may be the ones that tell
+        of_all = by_all_runs(second)
+        gain = 2.0 * (log_evidence(of_all) - log_evidence(whole))
         if gain > 0.0:
-            posterior = posterior_of(second)
+            posterior = posterior_of(second, whole=of_all)
         posterior.memory["by_mode"] = abs(gain)
         return posterior
 

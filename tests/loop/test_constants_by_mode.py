@@ -25,6 +25,7 @@ from discover.report.plots.loop.residual import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES, NOISE = (0.3, 1.0, 4.0, 15.0, 60.0), 0.01
+TIMES_OF_SLOW = np.geomspace(0.02, 20.0, 60)
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
@@ -270,3 +271,18 @@ def test_a_search_with_constants_by_mode_fits_nothing_again_that_has_none(monkey
     assert {*second.found} == {*first.found}
     # each mode has a constant of its own here
     assert second.alive()[0].log_evidence > first.alive()[0].log_evidence + 100.0
+
+
+def test_a_law_that_needs_constants_by_mode_is_weighed_with_them_by_all_runs():
+    # slow runs, and a threefold rate that judges: with one mobility for all modes non-affine motion
+    # is likelier, by a factor of some 400
+    generator, moduli, times = np.random.default_rng(1), (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
+    fluid, at, runs = multimode_giesekus((0.081, 0.417, 0.081), moduli, times), TIMES_OF_SLOW, []
+    for rate in (0.02, 0.05, 0.1, 0.06, 0.3):
+        stress = white(fluid.respond(flow(rate), at).sigma12, NOISE, generator)
+        runs.append(Run(f"{rate}", at, start_up(rate), np.full(len(at), rate), stress))
+    base = dc.Fluid(dc.make_law("ucm"), moduli, times)
+    data = Dataset("slow runs", tuple(runs))
+    result = dc.close_loop(data, base, held_out=["0.06", "0.3"], effects="named", max_effects=1)
+    assert result.verdict == "effects_added"
+    assert ("giesekus_mobility",) in result.explanations.likeliest_first[0].members

@@ -391,6 +391,8 @@ class Fitter:
         _, grid = self.noise_of(fit).log_likelihood(left, record)
         fit.noise = self.noise_of(fit).refined(left, record, grid)
         _, curvature = self._normal_equations(fit)
+        if not np.all(np.isfinite(curvature)):
+            return  # a step away the law runs away
         pulls = fit.priors.pulls(fit.coordinates)
         # over the widths of the priors no eigenvalue is less than one, however alike columns are
         scale = np.append(1.0 / np.sqrt(pulls[:, 1]), self.errors.widths(fit.linear))

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset import Run
 from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import Discrepancy
@@ -229,24 +228,20 @@ def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None =
 
 
 @in_one_thread
-def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
+def posterior_of(
+    search: Search, before: Posterior | None = None, whole: Search | None = None
+) -> Posterior:
     """Return the posterior over hypotheses that were fitted, wherever they come from.
 
     `before`: the posterior of the same search before others were added, of which is kept what these
-    do not change.
+    do not change. `whole`: by all runs, where that is known.
     """
     done = {} if before is None else before.memory
-    problem, alive = search.problem, search.alive()
-    best = search.rank(alive[0]) if alive else 0.0
-    near = [fit for fit in alive if search.rank(fit) > best - WINDOW][:_MOST]
-    whole, judged = search, near
-    if problem.predicted is not None:
-        every = [*problem.fitted.runs, *problem.predicted.runs]
-        whole = _fitted_to(every, search, near, done["whole"][0] if done else None)
-        judged = whole.alive()
+    problem, near = search.problem, near_the_likeliest(search)
+    whole = whole or by_all_runs(search, done["whole"][0] if done else None)
+    judged = near if whole is search else whole.alive()
     logs = np.array([whole.rank(fit) for fit in judged])
-    known = [*done["whole"][2], *([before.left] if before.left else [])] if before else []
-    beside = [_left_by(whole, fit, known) for fit in judged[:_WITH_DISCREPANCY]]
+    beside = [_left_by(whole, fit) for fit in judged[:_WITH_DISCREPANCY]]
     nothing = [whole.rank(one.fit) + one.log_factor + LOG_ODDS_OF_NONE for one in beside]
     nothing += [whole.rank(fit) + _unlike_noise(whole.fitter, fit) for fit in judged[:1]]
     total = float(np.logaddexp.reduce([*logs, *nothing]))
@@ -261,7 +256,7 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
     found.memory |= {**done, "whole": (whole, judged, beside)}
     if not near:
         return found
-    found.left = left = _left_by(search, near[0], known)
+    found.left = left = _left_by(search, near[0])
     none = own[0] + np.logaddexp(
         left.log_factor + LOG_ODDS_OF_NONE, _unlike_noise(search.fitter, near[0])
     )
@@ -271,32 +266,44 @@ def posterior_of(search: Search, before: Posterior | None = None) -> Posterior:
         found.by_left_out = _foretelling(found)
         fit = found.relied_on[0][0]
         if fit is not near[0]:
-            found.left = _left_by(search, fit, known)
+            found.left = _left_by(search, fit)
     return found
 
 
-def _fitted_to(
-    runs: Sequence[Run], search: Search, fits: Sequence[Fit], done: Search | None
-) -> Search:
-    """Return hypotheses fitted to other runs, beside those of a search of these that was done."""
+def near_the_likeliest(search: Search) -> list[Fit]:
+    """Return hypotheses that count beside the likeliest, which comes first."""
+    alive = search.alive()
+    return [fit for fit in alive if search.rank(fit) > search.rank(alive[0]) - WINDOW][:_MOST]
+
+
+def by_all_runs(search: Search, done: Search | None = None) -> Search:
+    """Return what is likely by the fitted runs, fitted to all, those too that are to be predicted.
+
+    These judge: nothing is named that they alone would ask for. `done`: what was fitted to all
+    before, beside which others come.
+    """
+    problem, fits = search.problem, near_the_likeliest(search)
+    if problem.predicted is None:
+        return search
     wanted = [*fits, search.found[frozenset()]]
     if done is None:
-        done = refitted(wanted, Fitter(search.problem, Rows.of(runs)))
+        runs = [*problem.fitted.runs, *problem.predicted.runs]
+        done = refitted(wanted, Fitter(problem, Rows.of(runs)))
     else:
         new = [fit for fit in wanted if frozenset(fit.names) not in done.found]
         if not new:
             return done
         done = done.copied()
         done.add([done.fitter.start(fit.names, fit.theta) for fit in new])
-    done.backwards().exchange()
-    return done
+    return done.backwards()
 
 
-def _left_by(search: Search, fit: Fit, known: Sequence[Discrepancy]) -> Discrepancy:
+def _left_by(search: Search, fit: Fit) -> Discrepancy:
     """Return what a hypothesis leaves; one that is known if nothing has changed."""
-    least = smallest(search, fit)
-    same = (one for one in known if one.fit is fit and one.smallest == least)
-    return next(same, None) or Discrepancy(search.fitter, fit, least)
+    least, known = smallest(search, fit), fit.memory.get("left")
+    if known is None or known.fit is not fit or known.smallest != least:
+        known = fit.memory["left"] = Discrepancy(search.fitter, fit, least)
+    return known
 
 
 def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
