@@ -155,7 +155,7 @@ class Along(NamedTuple):
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
     """Return what is recorded of a law at every sample, and its states there.
 
-    Of constants too a third of the work of their derivatives.
+    A third of the work of `states_and_jacobian` where eight constants move.
     """
 
     def one(protocol, grid):
