@@ -126,8 +126,18 @@ class TBNNUDE(RunPrediction):
                 problem, fitted = _rougher(problem, followed, known, recipe.samples)
             if work(whole) > recipe.affordable:
                 recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
+        modes = replace(known, modulus_covariance=None)
+
+        def shortened(law: TensorBasisNetwork, misfit: float) -> str:
+            self.fluid_ = replace(modes, law=law)
+            recorded = self._predict_runs(runs), self._predict_runs(list(followed))
+            return shortened_rightly(whole, held, recorded, misfit)
+
+        def holds(law: TensorBasisNetwork, misfit: float) -> bool:
+            return followed is runs or bool(shortened(law, misfit))
+
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
-        trained, agreement = self._train_all(problem, keys, recipe, known)
+        trained, agreement = self._train_all(problem, keys, recipe, known, holds)
         members = [member.law for member in trained]
         misfits = ensemble.member_misfits(members, problem)
         resolved, surprise = _resolved(recipe), None
@@ -140,16 +150,12 @@ class TBNNUDE(RunPrediction):
         self.ensemble_ = agreement
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
-        modes = replace(known, modulus_covariance=None)
-        self.fluid_ = replace(modes, law=best.law)
         self.ensemble_fluids_ = [replace(modes, law=law) for law in members]
-        shortened = ""
-        if followed is not runs:
-            recorded = self._predict_runs(runs), self._predict_runs(list(followed))
-            shortened = shortened_rightly(whole, held, recorded, best.misfit)
-            if not shortened:
-                self._learn(runs, known, shorten=False)
-                return
+        shorter = "" if followed is runs else shortened(best.law, best.misfit)
+        if followed is not runs and not shorter:
+            self._learn(runs, known, shorten=False)
+            return
+        self.fluid_ = replace(modes, law=best.law)
         cloud = sample_states(best.law, problem)
         library = self.projection_library or default_library()
         projection = project(best.law, cloud, library)
@@ -176,7 +182,7 @@ class TBNNUDE(RunPrediction):
                     for law, misfit, fitting in zip(members, misfits, fits, strict=True)
                 ],
             },
-            message="; ".join(filter(None, (best.message, trained[0].left_out, fitted, shortened))),
+            message="; ".join(filter(None, (best.message, trained[0].left_out, fitted, shorter))),
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
 
@@ -195,27 +201,29 @@ class TBNNUDE(RunPrediction):
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
     def _train_all(
-        self, problem: TrainingProblem, keys, recipe, known: Fluid
+        self, problem: TrainingProblem, keys, recipe, known: Fluid, goes_on
     ) -> tuple[list[Trained], str]:
-        """Return all members, and how they came about."""
+        """Return all members, and how they came about; `goes_on`: as of `train_default`."""
         say = by_steps(self.progress)
-        first = self._train(problem, keys[0], recipe, known, say)
+
+        def member(key) -> Trained:
+            return self._train(problem, key, recipe, known, say, goes_on)
+
+        first = member(keys[0])
         if len(keys) == 1:
             return [first], "a single member"
         if isinstance(recipe, PaperRecipe):
             # the first has compiled the program; its steps are too small to be shared out
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-                others = list(
-                    pool.map(lambda key: self._train(problem, key, recipe, known, say), keys[1:])
-                )
-            return [first, *others], "trained from initial weights of their own"
+                each = [first, *pool.map(member, keys[1:])]
+            return each, "trained from initial weights of their own"
         others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
-    def _train(self, problem: TrainingProblem, key, recipe, known: Fluid, say) -> Trained:
+    def _train(self, problem: TrainingProblem, key, recipe, known: Fluid, say, goes_on) -> Trained:
         relaxes, below = known.law.linear_relaxation, law_below(known)
         if isinstance(recipe, DefaultRecipe):
-            return train_default(problem, key, relaxes, recipe, say, below)
+            return train_default(problem, key, relaxes, recipe, say, below, goes_on)
         law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=below)
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"

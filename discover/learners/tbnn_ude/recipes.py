@@ -40,12 +40,14 @@ def train_default(
     recipe: DefaultRecipe | None,
     progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
+    goes_on: Callable[[TensorBasisNetwork, float], bool] = lambda law, misfit: True,
 ) -> Trained:
     """Return a law trained by the default recipe.
 
     `key`: of the initial weights. `linear_relaxation`: whether −σ is known. `progress`: called
     after every step with step, largest number of steps and misfit. `base_law`: known law below the
-    network.
+    network. `goes_on`: whether functions are worth their time beside a law of constants and its
+    misfit.
     """
     recipe = recipe or DefaultRecipe()
     session = Session(problem, recipe, progress)
@@ -58,7 +60,8 @@ def train_default(
         again = session.constants(thins)
         if session.misfit(again[1]) < session.misfit(law):
             penalised, law = again
-    if session.settled(law) or recipe.max_tensors == 0:
+    ends = session.settled(law) or recipe.max_tensors == 0
+    if ends or not goes_on(law, session.misfit(law)):
         return _finish(session, law, penalised, False, "constant coefficients")
     # the invariants as the data's own stresses have them, from the best law so far
     scale = invariant_sizes(session.cloud(law))
