@@ -42,7 +42,6 @@ class TaskResult:
 
 
 def _compare(study: Study, seed: int | None, folder: RunFolder, part: FollowedBy) -> Sequence[str]:
-    """Run both learners of a study and write the comparison report."""
     from discover.comparison.run_comparison import compare
     from discover.report.comparison.report import write_comparison
 

@@ -175,7 +175,6 @@ def relaxation_spectrum(
 
 
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
-    """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
     times, known = fit.relaxation_time, (search.solvent_viscosity, search.elastic_modulus)
     modulus, extra = fit.amounts[: len(times)], iter(fit.amounts[len(times) :])
     solvent, elastic = (

@@ -318,7 +318,6 @@ def _can_name_a_run(name: object) -> bool:
 
 
 def _by_run(samples: pd.DataFrame | None, name: str) -> dict[str, pd.DataFrame]:
-    """Return the samples of each run, in the order of the table, without columns it lacks."""
     if samples is None or not len(samples):
         return {}
     if "run" not in samples:

@@ -120,7 +120,6 @@ def _of_tables(read: load.Folder) -> Iterator[Finding]:
 
 
 def _shift_columns(index: Table) -> list[str]:
-    """Return the columns by which times may have been shifted to one temperature."""
     return [name for name in index.columns if name.lower() in _CLOCK_WORDS]
 
 

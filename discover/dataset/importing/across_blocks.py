@@ -87,7 +87,6 @@ def _recovers(ways: Sequence[tuple[np.ndarray, np.ndarray]]) -> bool:
 
 
 def _is_loop(up: tuple[np.ndarray, np.ndarray], down: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Return whether rates go up and then down with other stresses."""
     if not (series.every_row_differs(up[0]) and series.every_row_differs(down[0])):
         return False
     both = series.up_and_down(*(np.concatenate(pair) for pair in zip(up, down, strict=True)))

@@ -230,7 +230,6 @@ _ISOTHERMAL = 5.0  # °C, width of the middle nine tenths of a test at one tempe
 
 
 def _taken(readings: Readings, chosen: TestName | None, key: str) -> Recognised:
-    """Return what a block is taken for: what the user says, or else what it looks like."""
     every = np.ones(len(readings), bool)
     if chosen == "none":
         return Recognised("none", every, "left out as asked")

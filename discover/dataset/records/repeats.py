@@ -77,7 +77,6 @@ def _alike(one: object, other: object) -> bool:
 
 
 def _common_times(one: Run, other: Run) -> np.ndarray | None:
-    """Return the times of the run with fewer samples that both cover; None where they are few."""
     fewer, more = sorted((one, other), key=len)
     inside = (fewer.time >= more.time[0]) & (fewer.time <= more.time[-1])
     return fewer.time[inside] if np.count_nonzero(inside) >= _FEWEST_SAMPLES else None
