@@ -73,16 +73,9 @@ class Findings(tuple[Finding, ...], NotebookView):
 
 
 @cache
-def _checks() -> dict[str, tuple[Any, str, str]]:
-    content = tomllib.loads(
-        files("discover.dataset.checking").joinpath("checks.toml").read_text("utf-8")
-    )
-    return {
-        name: (severity, subject, text)
-        for severity, subjects in content.items()
-        for subject, texts in subjects.items()
-        for name, text in texts.items()
-    }
+def _checks() -> dict[str, Any]:
+    file = files("discover.dataset.checking") / "checks.toml"
+    return tomllib.loads(file.read_text("utf-8"))
 
 
 def found(check: str, file: str = "", **values: Any) -> Finding:

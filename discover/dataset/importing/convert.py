@@ -220,7 +220,6 @@ def _read(path: Path, mapping: Mapping) -> _File:
 
 _WAVES = {"strain_wave", "stress_wave", "wave_time"}
 
-
 _CALIBRATION = re.compile(alternatives("lines")["calibrations"], re.IGNORECASE)
 _A_CALIBRATION = (
     "a calibration or check of the instrument by its title, no test of the sample; to take it "
