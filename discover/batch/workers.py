@@ -93,8 +93,6 @@ class _Team:
 
 
 class _Worker:
-    """A process that runs `discover.batch.worker`."""
-
     def __init__(self):
         # in a session of its own: a terminal sends Ctrl-C to every process of a command, and it is
         # this one that tells workers to stop

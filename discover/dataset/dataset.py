@@ -252,7 +252,6 @@ class Dataset(NotebookView):
 
 
 def _by_text(said: Mapping[str, str]) -> dict[str, list[str]]:
-    """Return names by what is said of them, where anything is."""
     named: dict[str, list[str]] = {}
     for name, text in said.items():
         if text:

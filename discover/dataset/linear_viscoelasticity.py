@@ -175,7 +175,6 @@ def relaxation_spectrum(
 
 
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
-    """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
     times, known = fit.relaxation_time, (search.solvent_viscosity, search.elastic_modulus)
     modulus, extra = fit.amounts[: len(times)], iter(fit.amounts[len(times) :])
     solvent, elastic = (
@@ -206,7 +205,9 @@ def _covariance(
         sweep.angular_frequency, sweep.measured, found.relaxation_time, has_solvent
     )
     variance = np.sum(rows**2) / max(rows.size - design.shape[1], 1)
-    if not _seems_noise(rows):
+    tested = [[row] for row in rows] + [list(rows)]
+    few = rows.shape[1] < FEWEST_FAST  # which do not tell whether it is noise
+    if few or len(tested) * min(map(separate_probability, tested)) <= _SEEMS_NOISE:
         variance *= rows.size / sum(independent_samples(row) for row in rows)
     return variance * np.linalg.pinv(design.T @ design) * np.outer(amounts, amounts)
 
@@ -215,11 +216,3 @@ def _misfit(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, 
     """Return what a spectrum misses G′ and G″ by, relative, along increasing frequency."""
     order = np.argsort(sweep.angular_frequency)
     return (np.stack(found.moduli(sweep.angular_frequency)) / sweep.measured - 1.0)[:, order]
-
-
-def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
-    """Return whether noise of each frequency may leave such a misfit; not told of a few."""
-    if rows.shape[1] < FEWEST_FAST:
-        return False
-    tested = [[row] for row in rows] + [list(rows)]
-    return len(tested) * min(map(separate_probability, tested)) > _SEEMS_NOISE

@@ -12,25 +12,14 @@ import numpy as np
 import pandas as pd
 
 from discover.dataset.dataset import Dataset
-from discover.dataset.index_of_runs import (
-    rates_before,
-    read_clock_factors,
-    read_column,
-    read_index,
-)
+from discover.dataset.index_of_runs import rates_before, read_clock_factors, read_column, read_index
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, SetAside, read_run, table_of_run
 from discover.dataset.records.repeats import in_sequence
 from discover.dataset.run import Run
 from discover.dataset.tables import units
-from discover.dataset.tables.table import (
-    Table,
-    did_you_mean_file,
-    is_inside,
-    read_bytes,
-    table_in,
-)
+from discover.dataset.tables.table import Table, did_you_mean_file, is_inside, read_bytes, table_in
 from discover.errors import InputError, Problems
 from discover.plain_numbers import as_number, short
 from discover.words import unknown_name
@@ -329,7 +318,6 @@ def _can_name_a_run(name: object) -> bool:
 
 
 def _by_run(samples: pd.DataFrame | None, name: str) -> dict[str, pd.DataFrame]:
-    """Return the samples of each run, in the order of the table, without columns it lacks."""
     if samples is None or not len(samples):
         return {}
     if "run" not in samples:

@@ -106,7 +106,6 @@ class ModeSearch:
         return float(times[-1])
 
     def _variance(self, fit: ModeFit) -> float:
-        """Return the variance of the misfit, no less than what sweeps repeat to."""
         n_constants = len(fit.relaxation_time) + len(fit.amounts)
         return fit.squared / max(self.measured.size - n_constants, 1) + REPEATABILITY**2
 
@@ -145,7 +144,6 @@ class ModeSearch:
         return np.array([_mean(grid[part], modulus[part]) for part in parts])
 
     def _with_one_less(self, fit: ModeFit) -> np.ndarray:
-        """Return times with one mode left out, or two made one, at the least cost."""
         times = fit.relaxation_time
         trials = [np.delete(times, i) for i in range(len(times))]
         for i in range(len(times) - 1):

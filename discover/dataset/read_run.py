@@ -330,7 +330,6 @@ def _check_time(table: Table, time: Values) -> None:
 
 
 def _check_sign(name: str, time: Values, rate: Values, stress: Values) -> None:
-    """Refuse a record in which the fluid drives the rheometer."""
     power = rate * stress
     work, size = np.trapezoid(power, time), np.trapezoid(np.abs(power), time)
     if len(time) > 1 and work < _WRONG_SIGN * size:

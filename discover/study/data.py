@@ -4,7 +4,6 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from discover._version import __version__
 from discover.dataset import Dataset
@@ -58,10 +57,10 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
             made.law, made.parameters, made.protocol, *noise, made.samples
         )
     else:
-        options: dict[str, Any] = {"rate_is_measured": data.rate == "measured"}
-        for key in ("clock_factor", "rate_before", "sequence", "amplitude_sweep_rad_s"):
-            options[key] = getattr(data, key)
-        dataset = load_dataset(str(data.folder), base=_base(study), **options)
+        dataset = load_dataset(
+            str(data.folder), data.clock_factor, study.path and study.path.parent,
+            data.rate == "measured", data.rate_before, data.sequence, data.amplitude_sweep_rad_s,
+        )  # fmt: skip
     each = data.held_out == "each"
     dataset, roles = _with_tables(dataset, data)
     judges = (name for name, role in roles.items() if role == "judge")
@@ -160,10 +159,6 @@ def parse_study(content: dict, where: str = "the study") -> Study:
     return validated(Study, content, where)
 
 
-def _base(study: Study) -> Path | None:
-    return None if study.path is None else study.path.parent
-
-
 def fingerprint(study: Study, *extra: object) -> str:
     """Return a hash of everything that decides a study's results, `extra` too."""
     digest = hashlib.sha256(study.model_dump_json().encode())
@@ -171,7 +166,7 @@ def fingerprint(study: Study, *extra: object) -> str:
         digest.update(f"|{item!r}".encode())
     if study.data.folder is not None:
         # what else lies there decides nothing, and may be a result of this very study
-        for path in files_of(resolve_folder(study.data.folder, _base(study))):
+        for path in files_of(resolve_folder(study.data.folder, study.path and study.path.parent)):
             digest.update(path.name.encode("utf-8", "surrogateescape"))
             digest.update(read_bytes(path, path.name))
     if study.model.from_ is not None:

@@ -165,7 +165,6 @@ def _effects(
 
 
 def _intervals(rows: Any, file: Path) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the intervals of effects' constants, but for those with one for each mode."""
     found = {}
     with _damage(file):
         for row in rows:

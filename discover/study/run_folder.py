@@ -120,7 +120,6 @@ def _writable(what: str, where: str) -> Iterator[None]:
 
 
 def _digest(path: Path) -> str:
-    """Return the hash of a file; empty if it cannot be read."""
     try:
         return hashlib.sha256(read_bytes(path, path.name, is_input=False)).hexdigest()
     except InputError:

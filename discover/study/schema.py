@@ -46,7 +46,6 @@ def _not_tiny(value: float) -> float:
 
 Positive = Annotated[float, Field(gt=0, le=_MOST), AfterValidator(_not_tiny)]
 
-
 NotNegative = Annotated[float, Field(ge=0, le=_MOST)]
 ByHand = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_MODES)]
 """A constant of each relaxation mode."""

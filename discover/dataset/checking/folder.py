@@ -33,7 +33,6 @@ _TABLE_QUANTITIES = (
     units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS,
     material_functions.COMPLIANCE, material_functions.RELAXATION_MODULUS,
 )  # fmt: skip
-_TABLE_FILES = [f"{kind}.csv" for kind in material_functions.TABLES]
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
@@ -68,7 +67,7 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
     for run in runs:
         findings += run_checks.doubts_of_run(run)
     beside = []
-    for name in (SWEEP_FILE, *_TABLE_FILES):
+    for name in load.DATA_FILES[1:]:
         if name not in names and (root / name).is_file():
             with suppress(InputError):  # said when it is read
                 beside.append(read_table(root / name))
@@ -121,7 +120,6 @@ def _of_tables(read: load.Folder) -> Iterator[Finding]:
 
 
 def _shift_columns(index: Table) -> list[str]:
-    """Return the columns by which times may have been shifted to one temperature."""
     return [name for name in index.columns if name.lower() in _CLOCK_WORDS]
 
 
@@ -200,12 +198,10 @@ def _of_columns(runs: Sequence[Table], beside: Sequence[Table]) -> Iterator[Find
 
 def _others(root: Path, names: Sequence[str]) -> Iterator[Finding]:
     """Yield which tables nothing reads."""
-    there: list[str] = []
     with suppress(OSError):
-        there = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))
-    for name in there:
-        if name not in {*names, INDEX_FILE, SWEEP_FILE, *_TABLE_FILES}:
-            yield found("not_listed", name)
+        for name in sorted(os.listdir(root)):
+            if name.lower().endswith(".csv") and name not in {*names, *load.DATA_FILES}:
+                yield found("not_listed", name)
 
 
 def _copies(runs: list[Run]) -> Iterator[Finding]:

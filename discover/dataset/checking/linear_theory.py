@@ -186,8 +186,6 @@ def against_linear_theory(
 def _mistaken_units(
     runs: Sequence[Run], sweep: LinearSweep, spectrum: RelaxationSpectrum
 ) -> list[str]:
-    """Return which units in place of those read make all runs together agree with the sweep."""
-
     def agreement(**factors: float) -> float:
         parts = [_linear_part(run, sweep, spectrum, _UNIT_STRAIN, **factors) for run in runs]
         stress, linear = map(np.concatenate, zip(*parts, strict=True))
@@ -203,7 +201,6 @@ def _mistaken_units(
 def _of_start_up(
     run: Run, stress: Values, linear: Values, sweep: LinearSweep, mean_time: float
 ) -> Iterator[Finding]:
-    """Yield what is doubtful of its duration, its linear part and its steady state."""
     rate, frequency = abs(run.rate[0]), sweep.angular_frequency
     # strongly sheared melts are steady after some strain, however slow they relax
     if run.time[-1] < mean_time and (strain := rate * run.time[-1]) < 5.0:
@@ -303,7 +300,6 @@ def _shared_gain(
 
 
 def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
-    """Yield by how much the gains of runs differ, if by more than their errors leave open."""
     weights = errors**-2.0
     off = (gains - np.sum(weights * gains) / np.sum(weights)) / errors
     spread = float(np.sqrt(max(np.var(gains, ddof=1) - np.mean(errors**2), 0.0)))

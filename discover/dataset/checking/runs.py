@@ -73,16 +73,9 @@ class Findings(tuple[Finding, ...], NotebookView):
 
 
 @cache
-def _checks() -> dict[str, tuple[Any, str, str]]:
-    content = tomllib.loads(
-        files("discover.dataset.checking").joinpath("checks.toml").read_text("utf-8")
-    )
-    return {
-        name: (severity, subject, text)
-        for severity, subjects in content.items()
-        for subject, texts in subjects.items()
-        for name, text in texts.items()
-    }
+def _checks() -> dict[str, Any]:
+    file = files("discover.dataset.checking") / "checks.toml"
+    return tomllib.loads(file.read_text("utf-8"))
 
 
 def found(check: str, file: str = "", **values: Any) -> Finding:
@@ -142,7 +135,6 @@ def local_noise(time: Values, values: Values) -> Values:
 
 
 def _of_samples(run: Run) -> Iterator[Finding]:
-    """Yield spikes, values that are read several times, and a clock that began before the flow."""
     if spikes := without_spikes(run)[1]:
         where = ", ".join(f"{t:.6g}" for t in spikes[:4]) + (" …" if len(spikes) > 4 else "")
         count = "one sample" if len(spikes) == 1 else f"{len(spikes)} samples"
@@ -154,7 +146,6 @@ def _of_samples(run: Run) -> Iterator[Finding]:
 
 
 def _of_strain(run: Run, strain: Values) -> Iterator[Finding]:
-    """Hold a strain that was recorded against the sum of its rate."""
     steps = 0.5 * (run.rate[1:] + run.rate[:-1]) * np.diff(run.time)
     expected, measured = np.concatenate([[0.0], np.cumsum(steps)]), strain - strain[0]
     size = np.max(np.abs(expected))
@@ -178,7 +169,6 @@ def _of_cycles(run: Run, turns: int) -> Iterator[Finding]:
 
 
 def _of_rise(run: Run) -> Iterator[Finding]:
-    """Yield that the rise of a start-up is hardly seen, or its stress lost in noise."""
     stress, noise = run.stress * np.sign(run.rate[0]), stress_noise(run)
     half = int(np.argmax(stress >= 0.5 * np.max(stress)))
     if half < _FEWEST_ON_THE_RISE:

@@ -9,16 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.dataset.importing import series
 from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.series import (
-    CONSTANT,
-    HARMONICS,
-    alternates,
-    every_row_differs,
-    spread,
-    up_and_down,
-)
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.importing.which_test import said_of
@@ -78,7 +71,7 @@ def _how_many(blocks: Sequence[Block], mapping: Mapping, file: str) -> int:
 def _recovers(ways: Sequence[tuple[np.ndarray, np.ndarray]]) -> bool:
     """Return whether the third rate is the first again, after another, and what it does is not."""
     first, second, third = (
-        float(np.median(rate)) if spread(rate) < CONSTANT else 0.0 for rate, _ in ways
+        float(np.median(rate)) if series.spread(rate) < series.CONSTANT else 0.0 for rate, _ in ways
     )
     if second and _is_loop(ways[0], ways[2]):
         return True
@@ -94,10 +87,9 @@ def _recovers(ways: Sequence[tuple[np.ndarray, np.ndarray]]) -> bool:
 
 
 def _is_loop(up: tuple[np.ndarray, np.ndarray], down: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Return whether rates go up and then down with other stresses."""
-    if not (every_row_differs(up[0]) and every_row_differs(down[0])):
+    if not (series.every_row_differs(up[0]) and series.every_row_differs(down[0])):
         return False
-    both = up_and_down(*(np.concatenate(pair) for pair in zip(up, down, strict=True)))
+    both = series.up_and_down(*(np.concatenate(pair) for pair in zip(up, down, strict=True)))
     return both is not None and both.apart
 
 
@@ -143,17 +135,17 @@ def waves_of(readings: Readings) -> Iterator[Block]:
         rows = raw & (points == point)
         wave, answer = strain[rows], stress[rows]
         columns: dict[str, tuple[str, np.ndarray]] = {}
-        if np.sum(rows) < _FEWEST_OF_WAVE or not alternates(wave):
+        if np.sum(rows) < _FEWEST_OF_WAVE or not series.alternates(wave):
             continue
         if clock is not None and np.isfinite(clock[rows]).all():
             time = clock[rows] - clock[rows][0]
         elif omega is not None and summary.any():
-            series = np.fft.rfft(wave)  # of whole cycles; the derivative in the phase of all
-            order = np.arange(len(series))
-            cycles = int(np.argmax(np.abs(series[1:]))) + 1
+            spectrum = np.fft.rfft(wave)  # of whole cycles; the derivative in the phase of all
+            order = np.arange(len(spectrum))
+            cycles = int(np.argmax(np.abs(spectrum[1:]))) + 1
             slowest = float(omega[summary][point - 1]) / cycles
             time = np.linspace(0.0, 2.0 * np.pi / slowest, len(wave) + 1)
-            kept = np.where(order <= HARMONICS * cycles, 1j * order * series, 0.0)
+            kept = np.where(order <= series.HARMONICS * cycles, 1j * order * spectrum, 0.0)
             rate = np.fft.irfft(kept, len(wave)) * slowest
             columns["shear rate"] = ("1/s", np.append(rate, rate[0]))
             wave, answer = np.append(wave, wave[0]), np.append(answer, answer[0])

@@ -220,7 +220,6 @@ def _read(path: Path, mapping: Mapping) -> _File:
 
 _WAVES = {"strain_wave", "stress_wave", "wave_time"}
 
-
 _CALIBRATION = re.compile(alternatives("lines")["calibrations"], re.IGNORECASE)
 _A_CALIBRATION = (
     "a calibration or check of the instrument by its title, no test of the sample; to take it "
@@ -230,7 +229,6 @@ _ISOTHERMAL = 5.0  # °C, width of the middle nine tenths of a test at one tempe
 
 
 def _taken(readings: Readings, chosen: TestName | None, key: str) -> Recognised:
-    """Return what a block is taken for: what the user says, or else what it looks like."""
     every = np.ones(len(readings), bool)
     if chosen == "none":
         return Recognised("none", every, "left out as asked")

@@ -15,11 +15,9 @@ from discover.dataset.importing.text_rows import (
     MOST_CELLS,
     Constant,
     constants_of,
-    is_number,
     with_points,
 )
 from discover.dataset.tables.table import read_bytes
-from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
 from discover.validation import require_new_name
 from discover.words import unknown_name
@@ -105,25 +103,22 @@ def read_reptate(path: Path) -> list[Block]:
     width = len(wanted)
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT)
     lines = re.split(r"\r\n|\r|\n", content.decode("cp1252", "replace"))
-    table = [line.lstrip("#").replace(",", " ").split() for line in lines]
-    data = [i for i, row in enumerate(table) if len(row) >= width and all(map(is_number, row))]
-    if len(data) < 2:
+    rows = [line.lstrip("#").replace(",", " ").split() for line in lines]
+    found = [block for block in blocks_of_rows(rows) if len(block.columns) >= width]
+    if not found:
         raise InputError(
             f"{path.name} has no lines of {width} numbers ({', '.join(n for n, _ in wanted)}), as "
             f"a {suffix} file of RepTate has below its first line. Correct it, or give it another "
             "suffix and --format text."
         )
-    whole = max(len(table[i]) for i in data)
     # a file may hold more columns than its suffix names, under names of their own
-    named = [row for row in table[1 : data[0]] if len(row) == whole]
-    further = [name_and_unit(name, "") for name in named[0][width:]] if named else []
-    further += [(f"column {i + 1}", "") for i in range(width + len(further), whole)]
-    if len(named) > 1:
-        further = [(name, unit or below) for (name, unit), below in zip(
-            further, named[1][width:], strict=True)]  # fmt: skip
-    cells = tuple(tuple((table[i] + [""] * whole)[:whole]) for i in data)
-    first = [] if data[0] == 0 else [[lines[0]]]
-    given = {constant.name: constant.value for constant in constants_of(first)}
+    widest = max(found, key=lambda block: len(block.columns)).columns
+    own = enumerate(widest[width:], start=width + 1)
+    further = [(name or f"column {i}", unit) for i, (name, unit) in own]
+    cells = tuple(
+        (*row, *[""] * (len(widest) - len(row))) for block in found for row in block.cells
+    )
+    given = {constant.name: constant.value for constant in constants_of([[lines[0]]])}
     known = {**parameters, "T": _TEMPERATURE}
     constants = tuple(
         Constant(name, given[key], unit) for key, (name, unit) in known.items() if key in given
@@ -136,7 +131,7 @@ def read_reptate(path: Path) -> list[Block]:
         )
     # of a creep file `rec` says that the strain is the recovered one
     name = "recovery" if float(given.get("rec", 0)) else suffix[1:]
-    return [Block(name, (*wanted, *further), cells, data[0] + 1, constants)]
+    return [Block(name, (*wanted, *further), cells, found[0].line, constants)]
 
 
 class Importer(NamedTuple):

@@ -14,7 +14,6 @@ from discover.validation import Section, one_of, validated
 
 MAPPING_FILE = "import.toml"
 
-
 QuantityName = Annotated[str, AfterValidator(one_of("quantity", lambda: QUANTITIES))]
 
 TestName = Literal[

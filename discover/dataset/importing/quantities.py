@@ -13,13 +13,7 @@ from discover.dataset.importing.text_rows import is_clock
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
 from discover.dataset.tables import units
 from discover.dataset.tables.table import shown
-from discover.dataset.tables.units import (
-    ABSOLUTE_ZERO,
-    Quantity,
-    read_heading,
-    read_unit,
-    tidy_unit,
-)
+from discover.dataset.tables.units import Quantity
 from discover.errors import InputError
 from discover.words import listed
 
@@ -104,7 +98,7 @@ def split_name(key: str, name: str) -> tuple[int, str] | None:
         if rank is None or not re.search(r"[^\W\d_]|%", tail):
             continue
         # this project's own 1_s and rad_s, and Pa_s
-        below = tail.replace("_", "/") if read_heading(tail) is not None else tail
+        below = tail.replace("_", "/") if units.read_heading(tail) is not None else tail
         for text in (below, tail.replace("_", "*")):
             if _is_unit_of(key, text):
                 return rank, text
@@ -114,7 +108,7 @@ def split_name(key: str, name: str) -> tuple[int, str] | None:
 def _is_unit_of(key: str, unit: str) -> bool:
     if key == "temperature":
         return to_celsius(0.0, unit) is not None
-    known = read_unit(unit)
+    known = units.read_unit(unit)
     return known is not None and units.factor_to(known, QUANTITIES[key]) is not None
 
 
@@ -125,7 +119,7 @@ def fits(key: str, name: str, unit: str) -> bool:
     name = plain(name)
     if len(name) > _SHORT or any(letter > "\u2e80" for letter in name):
         return True
-    if key != "temperature" and (not unit or read_unit(unit) is None):
+    if key != "temperature" and (not unit or units.read_unit(unit) is None):
         # without a unit G' is a modulus, and t is a time; D and n may be anything
         unsure = (name == "gp" and key == "shear_rate") or (len(name) == 1 and name.isascii())
         return name in ("t", "w", "f", "j") or not unsure
@@ -134,25 +128,25 @@ def fits(key: str, name: str, unit: str) -> bool:
 
 def to_celsius(value: Any, unit: str) -> Any:
     """Return a temperature, or an array of them, in °C; None if the unit is none of temperature."""
-    scale = tidy_unit(unit).replace("º", "°").replace("°", "").removeprefix("deg").strip()
+    scale = units.tidy_unit(unit).replace("º", "°").replace("°", "").removeprefix("deg").strip()
     scale = scale.upper().translate({0x421: "C", 0x41A: "K"})  # as a Russian keyboard writes them
     if scale in ("", "-", "1") and "°" not in unit and "deg" not in unit:
         return None if not unit else value  # a program's table says a pure number
     if scale in ("C", "CELSIUS"):
         return value
     if scale in ("K", "KELVIN"):
-        return value + ABSOLUTE_ZERO
+        return value + units.ABSOLUTE_ZERO
     return (value - 32.0) / 1.8 if scale in ("F", "FAHRENHEIT") else None
 
 
 def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     """Factor to SI of a unit as it was written; InputError where it is no unit of the quantity."""
     quantity = QUANTITIES[key]
-    if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
+    if key == "angular_velocity" and units.tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
         unit = "turn/min"
     if key.endswith("viscosity") and unit.lower() == "cps":  # centipoise, not counts
         unit = "cP"
-    found = read_unit(unit)
+    found = units.read_unit(unit)
     if found is None:
         raise InputError(
             f"{name}: the unit {shown(unit)!r} of {shown(column)} is not known. Give it in "

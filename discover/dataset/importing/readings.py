@@ -120,7 +120,6 @@ class Readings:
         yield from (names[i] for i in self.block.filled if i not in passed and names[i])
 
     def _unit_given(self, key: str) -> str:
-        """Return the unit that the user says; of a strain also by the name of its amplitude."""
         given, other = self.mapping.units, SAME.get(key, "")
         return given.get(key) or ("" if other in self.columns else given.get(other, ""))
 
@@ -212,7 +211,6 @@ class Readings:
         return found.unit, found
 
     def _made(self, key: str) -> Values | None:
-        """Return a quantity that follows from others of the same row."""
         source = INSTRUMENT.get(key)
         if source in self.columns and self.geometry is not None:
             factor = self.geometry.per_signal(key)
@@ -246,7 +244,6 @@ class Readings:
         return None if angle is None or size is None else size * part(angle)
 
     def _constant(self, key: str) -> float | None:
-        """Return what the header says of the whole block, in SI units; None if nothing."""
         if (found := self._find_constant(key)) is None:
             return None
         value, name = float(found.value), shown(found.name)
@@ -274,7 +271,6 @@ class Readings:
         return min(known, key=lambda c: (not c.unit, ranks[c]), default=None)
 
     def _geometry(self) -> Geometry | None:
-        """Return the tool that the header describes; None if it does not, wholly."""
         keys = ("radius", "diameter", "gap", "cone_angle")
         try:
             radius, diameter, gap, angle = ((self._constant(key) or 0.0) for key in keys)
@@ -289,5 +285,4 @@ class Readings:
 
 
 def _is_temperature(degrees):
-    """Return whether numbers in °C can be temperatures, as a `Mapping` takes them."""
     return (degrees >= ABSOLUTE_ZERO) & (degrees <= 2000.0)

@@ -180,7 +180,6 @@ def _begin(made: Record, readings: Readings) -> None:
 
 
 def _note_steadiness(made: Record, time: Values | None) -> None:
-    """Note how far the ways up and down are apart, and points held for a small strain."""
     rate = made.table["shear_rate"]
     if (ways := up_and_down(rate, made.table["stress"])) is not None:
         made.notes.append(f"the ways up and down in rate are {ways.described}")
@@ -191,7 +190,6 @@ def _note_steadiness(made: Record, time: Values | None) -> None:
 
 
 def _note_alternation(made: Record) -> None:
-    """Note whether an oscillation had gone on before the record."""
     time, stress = made.table["time"], made.table["stress"]
     moved = made.table.get("strain", made.table.get("shear_rate"))
     imposed, answer = (stress, moved) if made.kind == "creep" else (moved, stress)
@@ -205,7 +203,6 @@ def _note_alternation(made: Record) -> None:
 
 
 def _with_strain(table: Table) -> Table:
-    """Return time, stress and strain, which is the integral of the rate where that stands."""
     strain = table["strain"] if "strain" in table else strain_of(table["time"], table["shear_rate"])
     return {"time": table["time"], "stress": table["stress"], "strain": strain}
 

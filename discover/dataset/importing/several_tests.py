@@ -82,7 +82,6 @@ def _head(column: tuple[str, str]) -> _Head:
 
 
 def _quantity(head: _Head) -> str | None:
-    """Return which quantity a column of this name would be."""
     ranks = ((key, name_rank(key, head.base, head.unit)) for key in QUANTITIES)
     return next((key for key, rank in ranks if rank is not None), None)
 
@@ -267,7 +266,6 @@ def _by_set_value(readings: Readings) -> list[Block]:
 
 
 def _by_restart(readings: Readings) -> list[Block]:
-    """Split where the clock, the frequencies or the rates start again."""
     block = readings.block
     for key in ("time", "omega", "shear_rate"):
         values = _values(readings, key)
@@ -307,7 +305,6 @@ def _values(readings: Readings, key: str) -> Float[np.ndarray, " m"] | None:
 
 
 def _sweeps(readings: Readings) -> bool:
-    """Return whether frequencies or rates go from row to row: a table, no record in time."""
     for key in ("omega", "shear_rate"):
         values = _values(readings, key)
         if values is not None and len(np.unique(values)) > len(values) // 4:

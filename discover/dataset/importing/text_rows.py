@@ -185,7 +185,6 @@ def _decode(content: bytes, name: str, encoding: str | None) -> str:
 
 
 def _delimiter(lines: list[str]) -> str:
-    """Return the sign that splits most lines; a comma only if nothing better does."""
     filled = [line for line in lines if line.strip()]
     for mark in ("\t", ";"):
         if sum(mark in line for line in filled) > 0.3 * len(filled):

@@ -94,7 +94,6 @@ def _named(words: str) -> str | None:
 
 
 def _titles(lines: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield lines that may say which test it is, the last first."""
     for line in reversed(lines):
         cells = [cell.strip(" #%:") for cell in line if cell.strip(" #%:")]
         if not cells or len(cells) > 2:
@@ -175,7 +174,6 @@ def _as_extension(readings: Readings, said: Said | None) -> None:
 
 
 def _unread_in(readings: Readings, quantity: Quantity) -> Iterator[int]:
-    """Yield the columns with a name in a unit of a quantity that nothing is known by."""
     for i, (name, unit) in enumerate(readings.block.columns):
         known = read_unit(unit) if unit and i not in readings.columns.values() else None
         if name and known is not None and factor_to(known, quantity) is not None:
@@ -242,7 +240,6 @@ def _without_time(readings: Readings) -> Answer:
 
 
 def _waits(rate: Values, stress: Values) -> bool:
-    """Return whether the stress changes while the rate is held, in several rows at each rate."""
     steps = np.flatnonzero(np.abs(np.diff(rate)) > 1e-3 * np.max(np.abs(rate))) + 1
     long = [piece for piece in np.split(stress, steps) if len(piece) > _FEWEST]
     changes = [np.ptp(piece) > APART * np.max(np.abs(piece)) for piece in long]

@@ -64,16 +64,10 @@ def _same_test(one: Run, other: Run) -> bool:
     if times is None or not alike or not all(_alike(*pair) for pair in numbers):
         return False
     longer = max((one, other), key=lambda run: run.time[-1])
-    if _share(one, other, times) < _SHARED:
+    if np.ptp(times) < _SHARED * max(np.ptp(one.time), np.ptp(other.time)):
         times = np.append(times, longer.time[longer.time > times[-1]])
     rates = shear_rates(one.protocol, times), shear_rates(other.protocol, times)
     return bool(np.max(np.abs(rates[0] - rates[1])) <= _SAME * np.max(np.abs(rates[0])))
-
-
-def _share(one: Run, other: Run, times: np.ndarray) -> float:
-    """Return how much of the longer of two runs some times cover."""
-    longest = max(run.time[-1] - run.time[0] for run in (one, other))
-    return float((times[-1] - times[0]) / longest)
 
 
 def _alike(one: object, other: object) -> bool:
@@ -83,7 +77,6 @@ def _alike(one: object, other: object) -> bool:
 
 
 def _common_times(one: Run, other: Run) -> np.ndarray | None:
-    """Return the times of the run with fewer samples that both cover; None where they are few."""
     fewer, more = sorted((one, other), key=len)
     inside = (fewer.time >= more.time[0]) & (fewer.time <= more.time[-1])
     return fewer.time[inside] if np.count_nonzero(inside) >= _FEWEST_SAMPLES else None
