@@ -127,16 +127,17 @@ def description(answer: Any, brief: int = 0) -> str:
     """
     if not answer.title:
         return ""
-    noise = "" if answer.noise is None else f" ({percent_of(answer.noise)})"
+    noise = "" if answer.noise is None else percent_of(answer.noise)
     found, each, own = answer.discrepancy, _unseen(answer), _corrected(answer, brief)
     most = max((one.inside for one in each.values()), default=1.0)
     (note,) = (one.note for one in each.values()) if len(each) == 1 else ("",)
     on, enough = note if "unseen run" in note else "unseen runs", tolerance(answer, brief)
     if answer.fits_to_the_noise and most <= answer.tolerance:
         size, enough = "≤ " * (len(each) > 1) + at_most(most), ""
-        said = f"Passes {on}: error {size} above noise{noise}"
+        said = f"Passes {on}: error {size} above noise{f' ({noise})' * bool(noise)}"
     elif answer.fits_to_the_noise:
-        said = f"Fits {'the flow curve ' * answer.range.steady}within the noise{noise}"
+        within = f"within the noise{f' of {noise}' * bool(noise)}"
+        said = f"Fits {'the flow curve ' * answer.range.steady}{within}"
     elif found is None or not found.size:
         said = "" if answer.error is None else f"{_OF_FITTED} {percent_of(answer.error)}"
     else:
@@ -154,9 +155,8 @@ def description(answer: Any, brief: int = 0) -> str:
 
 def _unseen(answer: Any) -> dict[str, Any]:
     """Return errors of what was measured and not fitted, by symbol."""
-    each = {symbol: answer.expected(name) for name, symbol in SYMBOLS.items()}
-    known = {symbol: one for symbol, one in each.items() if one.inside is not None}
-    return {s: one for s, one in known.items() if one.is_measured and not one.is_residual}
+    each = {s: answer.expected(n) for n, s in SYMBOLS.items() if answer.expected(n).is_measured}
+    return {s: one for s, one in each.items() if one.inside is not None and not one.is_residual}
 
 
 def _of_unseen(answer: Any, each: Mapping[str, Any], size: str, brief: int) -> str:

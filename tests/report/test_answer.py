@@ -53,9 +53,9 @@ def test_the_first_line_has_law_constants_error_and_range():
     passed = "Passes 2 unseen runs: error 6 % above noise (1 %), corrected for stress gain. Use"
     assert passed in exact.headline
     exact = replace(exact, expected_error={})
-    assert "Fits within the noise (1 %), corrected for" in exact.headline
+    assert "Fits within the noise of 1 %, corrected for" in exact.headline
     states = replace(exact, range=replace(MELT.range, steady=True)).headline
-    assert "Fits the flow curve within the noise (1 %)" in states
+    assert "Fits the flow curve within the noise of 1 %" in states
     assert "Use for steady shear stress only" in states
 
 
