@@ -131,9 +131,9 @@ def description(answer: Any, brief: int = 0) -> str:
     found, each, own = answer.discrepancy, _unseen(answer), _corrected(answer, brief)
     most = max((one.inside for one in each.values()), default=1.0)
     (note,) = (one.note for one in each.values()) if len(each) == 1 else ("",)
-    on, enough = note if "unseen run" in note else "unseen runs", tolerance(answer, brief)
+    on = note if note.partition(" ")[2].startswith("unseen") else "unseen runs"
     if answer.fits_to_the_noise and most <= answer.tolerance:
-        size, enough = "≤ " * (len(each) > 1) + at_most(most), ""
+        size = "≤ " * (len(each) > 1) + at_most(most)
         said = f"Passes {on}: error {size} above noise{f' ({noise})' * bool(noise)}"
     elif answer.fits_to_the_noise:
         within = f"within the noise{f' of {noise}' * bool(noise)}"
@@ -149,8 +149,9 @@ def description(answer: Any, brief: int = 0) -> str:
         if found.unseen:
             said = _of_unseen(answer, each, f"{size} on {on}", brief)
             own = own * (len(each) < 2 or "σ12" not in each)
-    told = ", ".join(filter(None, [said, own])), enough
-    return f"{'; '.join(filter(None, told))}." if said else ""
+    enough = "" if said.startswith("Passes") else tolerance(answer, brief)
+    said = ", ".join(filter(None, [said, own * bool(said)]))
+    return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
 
 
 def _unseen(answer: Any) -> dict[str, Any]:

@@ -123,9 +123,8 @@ def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            fits = f"{OF_SWEEP[name]} {Constant(name, one.value, one.ci95).measured('')}"
-            both = "Measure sweep and runs on one rheometer filling"
-            return f"{both}: runs fit {fits} times the sweep's."
+            fits = f"{OF_SWEEP[name]} {Constant(name, one.value, one.ci95).measured('')} times"
+            return f"Measure sweep and runs on one rheometer filling: runs fit {fits} the sweep's."
     return ""
 
 
