@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from discover.answer.sentences import SYMBOLS, at_most, noise_of, worst_run
+from discover.answer.sentences import SYMBOLS, at_most, worst_run
 from discover.words import percent_of
 
 
@@ -56,7 +56,7 @@ def errors(answer: Any) -> list[Errors]:
             apart = True
             by_law.append(Row(symbol, one.note * bool(near), near or "see above", far))
         elif not one.is_known:
-            row = Row(symbol, "", ": ".join(filter(None, ["untested", one.note])), None)
+            row = Row(symbol, "", one.note or one.missing, None)
             if by_law and by_law[-1] == row._replace(symbol=by_law[-1].symbol):
                 row = row._replace(symbol=f"{by_law.pop().symbol}, {symbol}")
             by_law.append(row)
@@ -69,20 +69,20 @@ def errors(answer: Any) -> list[Errors]:
         told = f"falls above {answer.falls_above}"
         by_law.append(Row("steady flow curve", "of this law", told, None))
     heads = (_INSIDE, _TWICE) if apart else ("", "")
-    title = f"{_UNMEASURED}{'; laws that fit as well differ by' * apart}"
-    blocks = Errors(_title(answer), (_INSIDE, "beyond"), measured), Errors(title, heads, by_law)
+    title = f"{_UNTESTED}{': spread between equally good laws (not an error)' * apart}"
+    blocks = Errors(_title(answer), (_INSIDE, _BEYOND), measured), Errors(title, heads, by_law)
     return [one for one in blocks if one.rows]
 
 
-_INSIDE = "in\N{NO-BREAK SPACE}range"
-_UNMEASURED, _TWICE = "No measurement", "at twice the highest rate"
+_INSIDE, _BEYOND = "in\N{NO-BREAK SPACE}range", "beyond the range"
+_UNTESTED, _TWICE = "Never tested", "at twice the highest rate"
 
 
 def _title(answer: Any) -> str:
     """Return what the errors are, and the noise that they do not hold."""
-    of = "Residual of the fitted" if answer.expected("sigma12").is_residual else "Error on unseen"
-    noise = f" besides {noise_of(answer)} of {percent_of(answer.noise)}" if answer.noise else ""
-    return f"{of} runs{noise}"
+    residual = answer.expected("sigma12").is_residual
+    of = "Residual of the fitted runs" if residual else "Error on unseen runs above noise"
+    return of + (f" ({'noise ' * residual}{percent_of(answer.noise)})" if answer.noise else "")
 
 
 def _note(answer: Any, one: Any) -> str:
@@ -96,4 +96,4 @@ def _inside(answer: Any, one: Any) -> str:
     if one.inside is None:
         return "not measured"
     is_noise = not one.inside or (one.is_residual and answer.fits_to_the_noise)
-    return f"within {noise_of(answer)}" if is_noise else at_most(one.inside)
+    return "within noise" if is_noise else at_most(one.inside)

@@ -17,10 +17,10 @@ def reduced_to(answer: Any) -> str:
     return "the reference temperature" if at is None else degrees(at)
 
 
-def shortened(factor: float) -> str:
-    """Return what a shift factor does to times, in words."""
-    by, way = (1.0 / factor, "shorter") if factor < 1.0 else (factor, "longer")
-    return f"{way} by a factor of {significant(by, 3)}"
+def scaled(factor: float) -> str:
+    """Return what makes times of those at the reference temperature, in words."""
+    by, way = (1.0 / factor, "divide") if factor < 1.0 else (factor, "multiply")
+    return f"{way} by {significant(by, 3)}"
 
 
 def shifts(answer: Any) -> list[tuple[float, float]]:
@@ -37,10 +37,10 @@ def shifted(answer: Any) -> str:
     if not answer.shift_factors:
         return ""
     said = [
-        f"{shortened(float(factor))} at {degrees(at)} (a_T = {significant(factor, 3)})"
+        f"{scaled(float(factor))} for {degrees(at)} (a_T = {significant(factor, 3)})"
         for at, factor in shifts(answer)
     ]
-    return f"Moduli and times are those at {reduced_to(answer)}; times are {', '.join(said)}."
+    return f"Moduli and times are for {reduced_to(answer)}; times: {', '.join(said)}."
 
 
 def is_plain(answer: Any) -> bool:
@@ -68,7 +68,7 @@ def linear_part(answer: Any) -> str:
         ("G", "Pa", [mode.modulus_Pa for mode in answer.modes]),
         ("λ", "s", [mode.relaxation_time_s for mode in answer.modes]),
     ):
-        low, high = (f"{short(end)} {unit}" for end in (min(values), max(values)))
+        low, high = (f"{as_constant(answer, v)} {unit}" for v in (min(values), max(values)))
         only = f"{letter} = {as_constant(answer, values[0])} {unit}"
         found.append(f"{letter} from {low} to {high}" if len(values) > 1 else only)
     if answer.solvent_viscosity_Pa_s:
@@ -99,10 +99,17 @@ def table(answer: Any) -> tuple[list[str], list[list[str]]]:
     return ["mode", "G (Pa)", "λ (s)", *(one.symbol for one in each)], rows
 
 
-def of_which_added(answer: Any) -> str:
-    """Return how many modes were declared and how many added, in brackets; empty without these."""
+def origin(answer: Any) -> str:
+    """Return whether modes were given or fitted, and how many were added, in brackets."""
     added = sum(is_added(answer, one) for one in answer.modes)
-    return f" ({len(answer.modes) - added} given, {added} added)" if added else ""
+    own = {one.name for one in answer.constants if one.ci95 is not None}
+    how = "given, rescaled" if own & OF_SWEEP.keys() else "given"
+    how = "fitted" if own & {"modulus_Pa", "relaxation_time_s"} else how
+    return f" ({len(answer.modes) - added} {how}, {added} added)" if added else f" ({how})"
+
+
+OF_SWEEP = {"modulus_factor": "moduli", "relaxation_time_factor": "relaxation times"}
+"""Factors on moduli or times of the sweep that the runs want, and on what."""
 
 
 def is_added(answer: Any, mode: Any) -> bool:

@@ -117,6 +117,7 @@ class ExpectedError:
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
     is_residual: bool = False  # of fitted runs, which is no error to expect
     spread: tuple[float | None, float | None] = (None, None)
+    uncorrected: str = ""  # what of the instrument its records are not corrected for
 
     def __post_init__(self) -> None:
         # a few faster runs may be missed by less, and laws may differ by less there: by chance

@@ -1,6 +1,6 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.answer import modes_in_words as modes
@@ -9,7 +9,7 @@ from discover.words import LEVEL, counted, effect_title, listed, percent_of, sig
 _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
 # many), and how brief `description` is
-_SHORTER = ((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (-1, 2), (-1, 3), (-1, 4))
+_SHORTER = ((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), *((-1, brief) for brief in range(2, 6)))
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -65,8 +65,10 @@ def _law(answer: Any, most: int) -> str:
     named, every = constants(certain[: max(most, 0)]), answer.constants
     if answer.law is None and len(every) > min(most, len(certain)):  # some alone are no law
         each = [one.symbol for one in every if one.over_modes is not None]
-        poor = sum(one.is_poor for one in every)
-        count = counted(len(every) - len(each), "constant") + f" ({poor} {POORLY})" * bool(poor)
+        none = sum(not one.determined for one in every)
+        poor = sum(one.is_poor for one in every) - none
+        sure = ", ".join(filter(None, [f"{poor} poorly" * bool(poor), f"{none} not" * bool(none)]))
+        count = counted(len(every) - len(each), "constant") + f" ({sure} determined)" * bool(sure)
         named = [" and ".join([count, *(f"{one} by mode" for one in each)])] * (most >= 0)
         certain = []
     if several:
@@ -78,10 +80,10 @@ def _law(answer: Any, most: int) -> str:
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     for one in answer.constants:
-        known = one.name in OF_SWEEP and not one.is_poor
+        known = one.name in modes.OF_SWEEP and not one.is_poor
         if known and differ(one.ci95, answer.tolerance):
             level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
-            named.append(f"the sweep's {OF_SWEEP[one.name]} × {one.measured(level)}")
+            named.append(f"the sweep's {modes.OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None and not answer.shift_factors:
         named.append(f"at {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
@@ -108,95 +110,95 @@ def is_a_set(answer: Any) -> bool:
     )
 
 
-OF_SWEEP = {"modulus_factor": "moduli", "relaxation_time_factor": "relaxation times"}
-"""Factors on moduli or times of the sweep that the runs want, and on what."""
-
-
 def differ(ci95: Sequence[float] | None, tolerance: float) -> bool:
     """Return whether the interval of a factor says that it is not one, but for a tolerance."""
     low, high = ci95 or (1.0, 1.0)
     return high < 1.0 - tolerance or low > 1.0 + tolerance
 
 
-_OF_MODES = ("modulus_Pa", "relaxation_time_s", *OF_SWEEP)
+_OF_MODES = ("modulus_Pa", "relaxation_time_s", *modes.OF_SWEEP)
 
 
 def description(answer: Any, brief: int = 0) -> str:
-    """Return how well the law describes the runs, allowing for what, and if that is enough.
+    """Return how well the law describes the runs, corrected for what, and if that is enough.
 
-    `brief`: 1 without counts of runs and names of suspects, 2 without the worst run, 3 without
-    interval, 4 without suspects: the table has them.
+    `brief`: 1 without names of suspects, 2 without the worst run, 3 without interval, 4 without
+    whose errors several are, 5 without suspects: the table has them.
     """
     if not answer.title:
         return ""
-    within = "the flow curve within its" if answer.range.steady else "within the"
     noise = "" if answer.noise is None else percent_of(answer.noise)
-    found = answer.discrepancy
-    if answer.fits_to_the_noise:
-        said = f"Fits {within} {noise_of(answer)}{f' of {noise}' if noise else ''}"
+    found, each, own = answer.discrepancy, _unseen(answer), _corrected(answer, brief)
+    most = max((one.inside for one in each.values()), default=1.0)
+    (note,) = (one.note for one in each.values()) if len(each) == 1 else ("",)
+    on = note if note.partition(" ")[2].startswith("unseen") else "unseen runs"
+    if answer.fits_to_the_noise and most <= answer.tolerance:
+        size = "≤ " * (len(each) > 1) + at_most(most)
+        said = f"Passes {on}: error {size} above noise{f' ({noise})' * bool(noise)}"
+    elif answer.fits_to_the_noise:
+        within = f"within the noise{f' of {noise}' * bool(noise)}"
+        said = f"Fits {'the flow curve ' * answer.range.steady}{within}"
     elif found is None or not found.size:
-        said = "" if answer.error is None else _OF_FITTED + percent_of(answer.error)
+        said = "" if answer.error is None else f"{_OF_FITTED} {percent_of(answer.error)}"
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-        ends = f"{low}–{high} %" * (low != high and brief < 3)
+        ends = f" ({_LEVEL}{low}–{high} %)" * (low != high and brief < 3)
         # of fitted runs it is no error that a prediction could have
-        size = f"{percent_of(found.size)}{f' ({_LEVEL}{ends})' * bool(ends)}"
-        said = _of_unseen(answer, ends, brief) if found.unseen else _OF_FITTED + size
-    parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
-    return f"{'; '.join(filter(None, parts))}." if said else ""
+        size = percent_of(found.size) + ends
+        said = f"{_OF_FITTED} {size}"
+        if found.unseen:
+            said = _of_unseen(answer, each, f"{size} on {on}", brief)
+            own = own * (len(each) < 2 or "σ12" not in each)
+    enough = "" if said.startswith("Passes") else tolerance(answer, brief)
+    said = ", ".join(filter(None, [said, own * bool(said)]))
+    return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
 
 
-def noise_of(answer: Any) -> str:
-    """Return what noise is called: of a flow curve scatter, for nothing else measures it."""
-    return "scatter" if answer.range.steady else "noise"
+def _unseen(answer: Any) -> dict[str, Any]:
+    """Return errors of what was measured and not fitted, by symbol."""
+    each = {s: answer.expected(n) for n, s in SYMBOLS.items() if answer.expected(n).is_measured}
+    return {s: one for s, one in each.items() if one.inside is not None and not one.is_residual}
 
 
-_OF_FITTED = "Residual of the fitted runs "
-
-
-def _of_unseen(answer: Any, ends: str, brief: int) -> str:
+def _of_unseen(answer: Any, each: Mapping[str, Any], size: str, brief: int) -> str:
     """Return mean errors of unseen runs: of each quantity where several were measured, or of all.
 
-    And the worst of these, where one misses the tolerance and the range does not say it. `ends`:
-    between which the mean of many runs may lie, which those few at hand may not reach.
+    And the worst of these, where one misses the tolerance and the range does not say it.
     """
-    each = [
-        f"{symbol} {at_most(one.inside)}"
-        for name, symbol in SYMBOLS.items()
-        if (one := answer.expected(name)).inside and one.is_measured and not one.is_residual
-    ]
-    told = each if len(each) > 1 else [percent_of(answer.discrepancy.size)]
     worst = None if brief > 1 or answer.discrepancy.met_up_to else worst_run(answer)
-    if worst is not None and len(each) > 1 and answer.range.flows == ("shear",):  # a run of σ12
-        told = [f"{each[0]} (worst run {worst[1]})", *each[1:]]
-    elif worst is not None:
-        told = [*told, f"worst run {worst[1]}"]
-    rough = f"Too rough for {percent_of(answer.tolerance)}; m" if _is_too_rough(answer) else "M"
-    many = f" (many runs may average {ends})" * (bool(ends) and len(each) < 2)
-    unseen = answer.discrepancy.unseen if len(each) < 2 else "unseen data"
-    return f"{rough}ean error on {unseen}: {', '.join(told)}{many}"
+    of_worst = [] if worst is None else [f"worst run {worst[1]}"]
+    whose = "the default" if answer.tolerance == type(answer).tolerance else "your"
+    misses = f"Misses {whose} {percent_of(answer.tolerance)} tolerance: m" * _misses(answer) or "M"
+    if len(each) < 2:
+        return ", ".join([f"{misses}ean error {size}", *of_worst])
+    told, in_shear = [], answer.range.flows == ("shear",)
+    for symbol, one in each.items():
+        known = [*of_worst * in_shear, _corrected(answer, brief)] if symbol == "σ12" else []
+        known += [f"not corrected for {one.uncorrected}"] * bool(one.uncorrected)
+        behind = ", ".join(filter(None, known))
+        told.append(f"{symbol} {at_most(one.inside)}{f' ({behind})' * bool(behind)}")
+    data = " on unseen data" * (brief < 4)
+    return f"{misses}ean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
-def _is_too_rough(answer: Any) -> bool:
+def _misses(answer: Any) -> bool:
     """Return whether unseen runs miss the tolerance in the mean, and at each rate."""
     found = answer.discrepancy
     return bool(answer.adequate is False and found and found.unseen and not found.met_up_to)
 
 
 def _corrected(answer: Any, brief: int) -> str:
-    """Return what of the instrument the errors allow for; empty where nothing."""
+    """Return what of the instrument errors are corrected for; empty where nothing."""
     names = [
-        f"{effect_title(one.effect)}{f' (≤ {percent_of(one.correction)})' * bool(one.correction)}"
-        for one in answer.suspects[: None if brief < 4 else 0]
+        f"{effect_title(one.effect)}{f', ≤ {percent_of(one.correction)}' * bool(one.correction)}"
+        for one in answer.suspects[: None if brief < 5 else 0]
     ]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
     told = listed(names) if few else f"{len(names)} measurement errors"
-    # no instrument shapes what is measured in extension
-    what = "" if set(answer.range.flows) <= {"shear"} else " in shear"
-    return f"allowing for {told}{what}" if names else ""
+    return f"corrected for {told}" if names else ""
 
 
-_MOST_SUSPECTS = 2
+_MOST_SUSPECTS, _OF_FITTED = 2, "Residual of the fitted runs"
 
 
 def tolerance(answer: Any, brief: int = 0) -> str:
@@ -206,7 +208,7 @@ def tolerance(answer: Any, brief: int = 0) -> str:
     """
     over = len(_over_tolerance(answer))
     in_part = over and answer.discrepancy.met_up_to
-    if answer.adequate is None or _is_too_rough(answer) or in_part:
+    if answer.adequate is None or _misses(answer) or in_part:
         return ""
     state = "met" if answer.adequate else "missed"
     if over and (not brief or answer.adequate):
@@ -227,27 +229,27 @@ _FLOWS = {
 }
 
 
-def usable(answer: Any) -> tuple[list[str], list[str]]:
-    """Return for what the law may be used: what it was fitted to and meets, and what it implies.
+def usable(answer: Any) -> tuple[list[str], str]:
+    """Return for what the law may be used, and for what it may not before that is tested.
 
-    What no run tested is to be as good as what is asked of the shear stress.
+    That is what nothing tested and equally good laws agree in, up to the first that they do not.
     """
-    flows = answer.range.flows
-    tested, implied = [], []
+    flows, tested, implied = answer.range.flows, [], {}
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         fitted = ("shear" if name == "sigma12" else name) in flows
-        most = _USELESS if one.is_measured else answer.tolerance
-        if fitted if one.inside is None else one.inside <= most:
-            symbol = "steady shear stress" if name == "sigma12" and answer.range.steady else symbol
-            if one.is_measured:
-                tested.append(symbol)
-            else:
-                apart = at_most(one.inside or 0.0).removeprefix("< ")
-                by = f"is predicted (equally good laws agree within {apart})"
-                implied.append(f"{symbol} {by}, {one.note or 'never measured'}")
+        if one.is_measured and (fitted if one.inside is None else one.inside <= _USELESS):
+            states = name == "sigma12" and answer.range.steady
+            tested.append("steady shear stress" if states else symbol)
+    for name in ("N1", "uniaxial"):
+        if (near := answer.expected(name).spread[0]) is not None:
+            if near > answer.tolerance:
+                break
+            implied[SYMBOLS[name].removeprefix("uniaxial ")] = near
     tested += [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
-    return tested, implied
+    apart = at_most(max(implied.values(), default=0.0)).removeprefix("< ")
+    warned = f"Do not rely on {' or '.join(implied)} until tested: equally good laws agree within"
+    return tested, f"{warned} {apart}, but all could be wrong." * bool(implied)
 
 
 def where(answer: Any) -> str:
@@ -257,12 +259,26 @@ def where(answer: Any) -> str:
         return ""
     if not quantities or (answer.adequate is False and answer.size > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
+    use = f"{'If that suffices, use' if _misses(answer) else 'Use'} for {listed(quantities)}"
     only = " only" * (len(quantities) == 1 and not implied)
-    use, ends = "Otherwise use" if _is_too_rough(answer) else "Use", ""
-    met, worst = answer.discrepancy and answer.discrepancy.met_up_to, worst_run(answer)
-    if met and worst is not None:
-        ends = f": tolerance {percent_of(answer.tolerance)} met up to {met}, not above ({worst[1]})"
-    return f"{'; '.join([f'{use} for {listed(quantities)}{only}, {place}{ends}', *implied])}."
+    place = _in_part(answer, place) or f"{only}, {place}"
+    return " ".join(filter(None, [f"{use}{place}.", implied]))
+
+
+def _in_part(answer: Any, place: str) -> str:
+    """Return where each run meets the tolerance, and by how much others miss it; empty if none."""
+    worst, one = worst_run(answer), answer.range
+    if worst is None or not (met := answer.discrepancy.met_up_to):
+        return ""
+    within, number = f"within {percent_of(answer.tolerance)}", met.removesuffix(" 1/s")
+    (at, own), *others = [*one.by_temperature.items()] or [(None, one)]
+    unlike = others or one.frequency_rad_s or (at is None and answer.shift_factors)
+    if unlike or not one.tests or own.rate_1_s is None:
+        return f", {place}: {within} up to {met}; up to {worst[1]} off above"
+    low, high = map(modes.short, own.rate_1_s)
+    slow = met if low == number else f"{low}–{met}"
+    flows = listed(one.tests) + ("" if at is None else f" at {modes.degrees(at)}")
+    return f" in {flows}: {within} at {slow}; up to {worst[1]} off at {number}–{high} 1/s"
 
 
 def _place(answer: Any) -> str:
@@ -277,7 +293,7 @@ def _place(answer: Any) -> str:
             # what is slower than the fluid relaxes is nearly steady
             near = one.deborah[0] < _NEARLY_STEADY
             ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
-            slow = f", {'steady or ' * near}oscillating at De = λω {ends}"
+            slow = f" and De = λω {ends}"
         rate = "" if one.rate_1_s is None else f" ({modes.short(one.rate_1_s[1])} 1/s)"
         return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{rate}{slow}"
     tests = f"{listed(one.tests)} at " if one.tests else ""

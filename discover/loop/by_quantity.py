@@ -204,12 +204,13 @@ def measured(result: Any, kind: str) -> ExpectedError | None:
         _mean([beyond_noise(float(r.errors[-1]), _noise(r, noise)) for r in some])
         for some in (slow, fast)
     )
-    unfitted = "neither fitted nor corrected for axial compliance" if kind == "N1" else "not fitted"
+    bare = "axial compliance" * (kind == "N1" and len(held) == len(own))
+    unfitted = f"neither fitted nor corrected for {bare}" if bare else "not fitted"
     note = _FITTED if not held else _UNSEEN if len(held) < len(own) else unfitted
     if held and slow:
         note = f"{counted(len(slow), 'run')} at {_rates([r.unshifted for r in slow])}, {note}"
     at = _measured_at(fast, [r for r in records if not r.held_out])
-    return ExpectedError(inside, beyond, at, note=note, is_residual=not held)
+    return ExpectedError(inside, beyond, at, note=note, is_residual=not held, uncorrected=bare)
 
 
 def _noise(record: RunRecord, noise: float | None) -> float | None:

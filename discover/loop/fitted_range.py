@@ -99,6 +99,14 @@ def _test(record: RunRecord) -> str:
     return "start-up" if np.percentile(rates, 5.0) > _SAME * record.fastest else "steps of rate"
 
 
+def described(record: RunRecord) -> str:
+    """Return what a run is with its rates as the instrument had them, and its name in brackets."""
+    first, last = (significant(abs(float(rate)), 2) for rate in record.unshifted.rate[[0, -1]])
+    told = {"start-up": "the start-up at", "steps of rate": f"the step from {first} to"}
+    what = told.get(_test(record), "")
+    return f"{what} {last} 1/s ({record.name})" if what else record.name
+
+
 def _rates_of(record: RunRecord) -> list[float]:
     """Return the slowest rate at which a run stays and its fastest; of states each."""
     if record.control == "oscillation":

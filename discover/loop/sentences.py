@@ -5,11 +5,11 @@ from typing import Any
 
 from discover import words
 from discover.answer import Constant
-from discover.answer.modes_in_words import reduced_to
-from discover.answer.sentences import A_TRANSIENT, MUCH, OF_SWEEP, SYMBOLS, differ
+from discover.answer.modes_in_words import OF_SWEEP, reduced_to
+from discover.answer.sentences import A_TRANSIENT, MUCH, SYMBOLS, differ
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
-from discover.loop.fitted_range import as_measured
+from discover.loop.fitted_range import as_measured, described
 from discover.loop.runs import RunRecord
 
 MOST_NAMES = 3
@@ -83,9 +83,8 @@ def what_to_measure_next(result: Any) -> str:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if told := next((_CHECKS[one.slot] for one in result.free_form if one.in_answer), ""):
         return told.format(**_extreme(result))
-    if first := _of_unfitted(result):
-        then = _as_clause(_of_another_stress(result)).partition(" at ")[0]
-        return f"{first}{'; then ' * bool(then)}{then}."
+    if told := _of_unfitted(result):
+        return told
     if result.verdict == "unexplained":
         if own := suspected(result):  # of the instrument
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
@@ -113,18 +112,19 @@ _CHECKS = {
 
 
 def _extreme(result: Any) -> dict[str, str]:
-    """Return the names of the fitted runs of the largest stress and of the largest rate."""
+    """Return the fitted runs of the largest stress and of the largest rate, in words."""
     own = [r for r in result.records if not r.held_out and r.quantity not in ("N1", "N2")]
     strongest = max(own, key=lambda one: float(abs(one.measured).max()))
-    return {"strongest": strongest.name, "fastest": max(own, key=lambda one: one.fastest).name}
+    fastest = max(own, key=lambda one: one.fastest)
+    return {"strongest": described(strongest), "fastest": described(fastest)}
 
 
 def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            fits = f"{Constant(name, one.value, one.ci95).interval} times its {OF_SWEEP[name]}"
-            return f"Repeat the frequency sweep on the loading of these runs, which fit {fits}."
+            fits = f"{OF_SWEEP[name]} {Constant(name, one.value, one.ci95).measured('')} times"
+            return f"Measure sweep and runs on one rheometer filling: runs fit {fits} the sweep's."
     return ""
 
 
@@ -132,10 +132,10 @@ def _of_unfitted(result: Any) -> str:
     """Return what was measured besides, not fitted and missed; empty where nothing."""
     for kind in ("uniaxial", "N1"):
         found = measured(result, kind)
-        missed = (0.0 if found is None else found.inside) or 0.0
         fitted = any(kind in (r.flow, r.quantity) and not r.held_out for r in result.records)
-        if missed > result.tolerance and not fitted:
-            return f"Fit the recorded {SYMBOLS[kind]} too"
+        if found is not None and (found.inside or 0.0) > result.tolerance and not fitted:
+            first = f"Correct {SYMBOLS[kind]} for {found.uncorrected}, then fit it."
+            return first if found.uncorrected else f"Fit the recorded {SYMBOLS[kind]} too."
     return ""
 
 
@@ -175,7 +175,7 @@ def _of_predicted_n1(result: Any) -> str:
         return ""
     if any(record.has_normal_stress for record in result.records):
         return "Fit N1 too, which runs recorded: the law predicts it, and observe leaves it out."
-    return f"Measure N1 at {_fastest(_sheared(result))}: the law predicts it, and no run tested it."
+    return f"Measure N1 at {_fastest(_sheared(result))}: it tests the law."
 
 
 def _sheared(result: Any) -> list[RunRecord]:
@@ -213,9 +213,8 @@ def _by_geometry(result: Any) -> str:
     """
     by_run = (result.discrepancy or {}).get("by_run", {})
     fitted = [record for record in result.records if not record.held_out]
-    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in _sheared(result) or fitted}
-    run = max(errors, key=lambda name: errors[name], default="one run")
-    return f"Repeat {run} with another gap, to separate instrument and fluid."
+    run = max(_sheared(result) or fitted, key=lambda r: by_run.get(r.name, float(r.errors[-1])))
+    return f"Repeat {described(run)} with another gap, to separate instrument and fluid."
 
 
 def _telling_test(result: Any) -> str:

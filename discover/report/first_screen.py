@@ -71,11 +71,11 @@ def _fitted(answer: Answer) -> str:
     """Return in which flows constants were fitted, where, and at which temperature times hold."""
     if not any(one.ci95 for one in answer.constants):
         return ""
-    at = f"; times at {modes.reduced_to(answer)}" if answer.shift_factors else ""
+    at = f"; times are for {modes.reduced_to(answer)}" if answer.shift_factors else ""
     for used, factor in answer.shift_factors.items():
         if [*answer.range.by_temperature] == [used]:
-            there = f" at {modes.degrees(used)}"
-            at = f"{there}{at}, {modes.shortened(factor)}{there}"
+            there = modes.degrees(used)
+            at = f" at {there}{at}: {modes.scaled(factor)} for {there}"
     return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
 
 

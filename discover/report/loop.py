@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from discover.answer.sentences import noise_of
 from discover.laws.registry import LAWS
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
@@ -76,7 +75,6 @@ def write_loop(
         screen=answer_screen(result.answer),
         sentences=loop_verdict(result),
         error_rows=error_rows(result),
-        noise=noise_of(result.answer),
         noise_range=noise_range(result),
         inclusion=inclusion(result),
         kinds=KINDS,

@@ -168,7 +168,10 @@ _EXPLAINED = {
     "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
     "unseen data": "what no fit used: runs left out, or another quantity of a run",
     "unseen runs": "runs that a fit did not use: held out, or left out in turn",
+    "tolerance": "largest mean error above noise that is good enough: 5 % unless you set another",
+    "Passes": "mean error above noise is within the tolerance: 5 % unless you set another",
 }
+_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|Passes)"
 
 
 def explained(text: str) -> Markup:
@@ -177,9 +180,7 @@ def explained(text: str) -> Markup:
     def said(found: re.Match[str]) -> str:
         return f'<abbr title="{_EXPLAINED[found[0]]}">{found[0]}</abbr>'
 
-    return Markup(
-        re.sub(r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data))", said, str(subscripts(text)))
-    )
+    return Markup(re.sub(_EXPLAINS, said, str(subscripts(text))))
 
 
 def in_cell(text: str) -> str:

@@ -180,24 +180,27 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
         weak = {"N1": Spread(0.6, 0.8, stress=size), "uniaxial": Spread(1.2, 1.3)}
         assert what_to_measure_next(close(spread_of_laws=weak)).startswith(asked)
     # nor is a liquid stretched that does not keep its shape, such as blood of 0.01 Pa s
-    for viscosity, asked in ((0.03, "Repeat fast"), (3e4, "Measure uniaxial extension")):
+    for viscosity, asked in (
+        (0.03, "Repeat the start-up at 1 1/s (fast)"),
+        (3e4, "Measure uniaxial extension"),
+    ):
         thin = {"N1": Spread(0.6, 0.8, stress=0.05), "uniaxial": Spread(1.2, 1.3, stress=viscosity)}
         told = what_to_measure_next(close(spread_of_laws=thin, discrepancy=None))
         assert told.startswith(asked)  # at 1 1/s
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(close(spread_of_laws=same, discrepancy=None))
-    assert again.startswith("Repeat fast with another gap")
+    assert again.startswith("Repeat the start-up at 1 1/s (fast) with another gap")
 
 
 def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
     factor = StageParameter(0.52, (0.04, 0.79), "1")
-    again = "Repeat the frequency sweep on the loading of these runs, which fit "
+    again = "Measure sweep and runs on one rheometer filling: runs fit "
     for name, what in (
         ("modulus_factor", "moduli"),
         ("relaxation_time_factor", "relaxation times"),
     ):
         assert what_to_measure_next(close(declared_parameters={name: factor})) == (
-            f"{again}0.04–0.79 times its {what}."
+            f"{again}{what} 0.52 (0.04–0.79) times the sweep's."
         )
     # the first is next to one, within the tolerance of 10 %, and the last is no value
     for ends in ((0.5, 0.92), (0.4, 1.1), (0.001, 60.0)):
@@ -217,7 +220,10 @@ def test_what_was_measured_comes_before_another_stress_where_it_is_not_described
     found = result([*FITTED, pulled])  # misses of 6 %, tolerance 5 %
     found.discrepancy["by_run"] = {"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4}
     told = what_to_measure_next(found)
-    assert told == "Repeat fast with another gap, to separate instrument and fluid."  # no gap there
+    assert (
+        told
+        == "Repeat the start-up at 1 1/s (fast) with another gap, to separate instrument and fluid."
+    )
     # a miss within the noise is none to look into
     assert what_to_measure_next(result(FITTED, noise_floor=0.1)).startswith("Measure N1")
 
@@ -230,10 +236,7 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
         FITTED, verdict="effects_added", stages=(law,), spread_of_laws=known,
         explanations=SimpleNamespace(holding=lambda names: None),
     )  # fmt: skip
-    assert (
-        what_to_measure_next(found)
-        == "Measure N1 at 1 1/s: the law predicts it, and no run tested it."
-    )
+    assert what_to_measure_next(found) == "Measure N1 at 1 1/s: it tests the law."
     found.records = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
     assert what_to_measure_next(found).startswith("Fit N1 too, which runs recorded")
     # not where it cannot be measured, was, or other effects make the same records
@@ -287,7 +290,7 @@ def test_what_was_measured_and_missed_but_not_fitted_is_fitted_next():
     found = close([*FITTED, replace(held, flow="uniaxial")])
     assert errors_by_quantity(found)["uniaxial"].note == "1 run at 0.3 1/s, not fitted"
     told = what_to_measure_next(found)
-    assert told == "Fit the recorded uniaxial extension too; then measure N1."
+    assert told == "Fit the recorded uniaxial extension too."
     found.tolerance = 0.55
     assert what_to_measure_next(found).startswith("Measure N1")
     both = replace(held, flow="uniaxial", held_out=False)
@@ -301,7 +304,7 @@ def test_a_normal_stress_that_runs_recorded_and_no_fit_saw_is_compared():
     assert told.inside == 0.4  # constant: no noise of its own, and none of σ12 is subtracted
     assert told.is_measured
     assert told.note == "1 run at 0.1 1/s, neither fitted nor corrected for axial compliance"
-    assert what_to_measure_next(found).startswith("Fit the recorded N1 too; then measure uniaxial")
+    assert what_to_measure_next(found) == "Correct N1 for axial compliance, then fit it."
     fast = replace(normal, rate=3.0 + normal.rate)
     assert errors_by_quantity(close(FITTED, unfitted=(normal, fast)))["N1"].beyond == 0.4
     # samples that scatter by 0.4 hold nothing else

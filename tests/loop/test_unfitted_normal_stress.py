@@ -42,7 +42,7 @@ def test_recorded_n1_that_no_fit_saw_has_an_error_of_its_own():
     wrong = loop(*(run(name, rate, 0.5) for name, rate in (("slow", 0.3), ("fast", 1.2))))
     assert wrong.answer.expected("N1").inside == pytest.approx(1.0, rel=0.05)
     assert wrong.verdict == result.verdict  # no judgement of σ12 knows of it
-    assert wrong.answer.next_test.startswith("Fit the recorded N1 too")
+    assert wrong.answer.next_test.startswith("Correct N1 for axial compliance, then fit it")
 
 
 def test_samples_of_n1_that_no_fluid_can_have_are_not_compared():

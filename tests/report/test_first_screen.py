@@ -25,7 +25,10 @@ from tensor_library.law_terms import LawTerm
 
 @pytest.mark.parametrize(
     ("asked", "adequate", "said"),
-    [(0.05, False, "Too rough for 5 %; mean error"), (0.1, True, "tolerance 10 % met. Use for")],
+    [
+        (0.05, False, "Misses the default 5 % tolerance: mean error"),
+        (0.1, True, "tolerance 10 % met. Use for"),
+    ],
 )
 def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate, said):
     answer = replace(MELT, tolerance=asked)
@@ -80,7 +83,7 @@ def test_a_loop_page_begins_with_its_answer(tmp_path, no_pictures):
     assert page.index('id="answer"') < page.index('id="verdict"')
 
 
-def test_the_level_of_the_intervals_is_said_once():
+def test_the_level_of_the_intervals_of_constants_is_said_once():
     sums = Constant("consistency_Pa_sn", 4.0, (3.9, 4.1), "Pa sⁿ")
     fluid = Answer(
         "yield-stress fluid", "herschel_bulkley",
@@ -93,7 +96,7 @@ def test_the_level_of_the_intervals_is_said_once():
     assert declared.headline.count("(95 % CI 3.90–4.10)") == 1
     screen = answer_screen(MELT)
     said = " ".join([screen["headline"], screen["quality"], screen["behind"]])
-    assert said.count("(95") == 1
+    assert said.count("(95") == 2  # of the constants and of the mean error
 
 
 def test_a_law_that_cannot_be_written_out_leaves_the_best_classical_one_to_copy():
@@ -182,16 +185,15 @@ def test_a_residual_of_fitted_runs_is_no_expected_error():
         discrepancy=Discrepancy(0.06, (0.06, 0.06)),
         expected_error={"sigma12": ExpectedError(0.06, is_residual=True)},
     )
-    assert "Residual of the fitted runs 6 %, allowing for" in fitted.headline
-    noise = "runs besides noise of 0.25\N{NO-BREAK SPACE}%</th>"
+    assert "Residual of the fitted runs 6 %, corrected for" in fitted.headline
     page = render("answer.html", screen=answer_screen(fitted))
-    assert f"<th>residual of the fitted {noise}" in page
+    assert "<th>residual of the fitted runs (noise 0.25\N{NO-BREAK SPACE}%)</th>" in page
     assert not any("Error on unseen" in line for line in fitted.lines)
     page = render("answer.html", screen=answer_screen(MELT))
-    assert f"<th>error on unseen {noise}" in page
+    assert "<th>error on unseen runs above noise (0.25\N{NO-BREAK SPACE}%)</th>" in page
     # what the verdict calls noise has no size
     flow_curve = replace(fitted, fits_to_the_noise=True, range=Range(steady=True))
-    assert "runs besides scatter of 0.25 %: σ12 within scatter" in flow_curve.lines[1]
+    assert "Residual of the fitted runs (noise 0.25 %): σ12 within noise" in flow_curve.lines[1]
 
 
 def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above_it():
@@ -203,7 +205,7 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
     up_to = replace(runs, met_up_to="0.3 1/s")
     one_range = replace(MELT, discrepancy=up_to)  # and not a second one with the tolerance
     assert not tolerance(one_range)
-    assert "Use for σ12 only, 0.003–3 1/s: tolerance 5 % met up to 0.3 1/s, not above (9 %)." in (
+    assert "Use for σ12, 0.003–3 1/s: within 5 % up to 0.3 1/s; up to 9 % off above." in (
         one_range.headline
     )
     assert answer_screen(several)["expected"][0].rows[-1].note == "b"
@@ -249,28 +251,26 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     factors = {-10.0: 1.0 / 131.234, -23.0: 1.0 / 14.771}
     shifted = replace(MELT, temperature_C=-35.0, shift_factors=factors)
     assert (
-        "Moduli and times are those at −35 °C; times are shorter by a factor of 131 at −10 °C "
-        "(a_T = 0.00762), shorter by a factor of 14.8 at −23 °C (a_T = 0.0677)."
+        "Moduli and times are for −35 °C; times: divide by 131 for −10 °C "
+        "(a_T = 0.00762), divide by 14.8 for −23 °C (a_T = 0.0677)."
     ) in shifted.lines
     assert "0.003–3 1/s reduced to −35 °C." in shifted.headline
     screen = answer_screen(shifted)
     # 0.003–3 1/s times 131 and times 14.8
     assert screen["shifts"] == [("−10 °C", "0.00762", "0.39–390"), ("−23 °C", "0.0677", "0.044–44")]
-    assert "modes at −35 °C: G" in render("answer.html", screen=screen)
+    assert "modes (given) at −35 °C: G" in render("answer.html", screen=screen)
     hot = replace(shifted, range=replace(MELT.range, by_temperature={-10.0: MELT.range}))
     told = answer_screen(hot)["fitted"]
-    assert told == (
-        " (fitted in shear at −10 °C; times at −35 °C, shorter by a factor of 131 at −10 °C)"
-    )
+    assert told == (" (fitted in shear at −10 °C; times are for −35 °C: divide by 131 for −10 °C)")
     cold = replace(shifted, shift_factors={-50.0: 20.0})
-    assert any("times are longer by a factor of 20 at −50 °C" in line for line in cold.lines)
+    assert any("times: multiply by 20 for −50 °C" in line for line in cold.lines)
     clock = "times on the instrument's clock"  # which is not shifted
     assert clock not in screen["suspected"]  # a gain has no time
     lag = Suspect("transducer_lag", (Constant("tau", 0.35, (0.13, 0.48), "s"),))
     assert clock in answer_screen(replace(shifted, suspects=(lag,)))["suspected"]
     assert shifted.use["shift_factors"]["-10"] == pytest.approx(1.0 / 131.234)
     page = render("answer.html", screen=answer_screen(replace(MELT, temperature_C=-35.0)))
-    assert "by a factor" not in page
+    assert "divide by" not in page
 
 
 def test_two_structures_scale_relaxation_times_by_one_product():
@@ -315,7 +315,7 @@ def test_a_constant_has_the_same_digits_wherever_it_stands():
     page = render("answer.html", screen=answer_screen(fluid))
     assert modulus.number == "2.1 Pa"
     assert "<td>2.1</td><td>0.82</td>" in page
-    assert "mode: G\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}2.1\N{NO-BREAK SPACE}" in page
+    assert "mode (fitted): G\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}2.1\N{NO-BREAK SPACE}" in page
 
 
 def test_rates_in_prose_and_tables_cannot_be_read_as_numbers():
@@ -345,7 +345,7 @@ def test_quantities_that_nothing_is_known_of_share_a_row():
     ]  # fmt: skip
     page = render("answer.html", screen=answer_screen(fluid))
     table = page[page.index('<table id="answer-table">') : page.index("</table>")]
-    assert table.count('class="both">untested') == 1
+    assert table.count('class="both">not measured') == 1
     apart = {"N1": replace(none, note="0 by this law"), "N2": none}  # for reasons of their own
     assert len(answer_screen(replace(fluid, expected_error=apart))["expected"][1].rows) == 3
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from discover.answer.sentences import flows_of, noise_of
+from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
 from discover.loop.by_quantity import FASTER
 from discover.loop.parts import ConstantByMode
@@ -85,8 +85,7 @@ def waterfall_picture(result: LoopResult) -> look.Picture:
             bars = panel.barh(positions + shift, heights, 0.36, color=colour, label=label)
             panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
             _draw_ranges(panel, result, held_out=label != "fitted runs", shift=shift)
-        noise = noise_of(result.answer)
-        panel.axvline(100.0 * result.noise_floor, color=look.GREEN, lw=1.2, ls="--", label=noise)
+        panel.axvline(100.0 * result.noise_floor, color=look.GREEN, lw=1.2, ls="--", label="noise")
         look.make_percentage(panel.xaxis)
         heights = [100.0 * value for _, _, values, _ in series for value in values]
         panel.set_xlim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
