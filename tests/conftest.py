@@ -86,7 +86,7 @@ _LONG = (
     "test_notebooks.py", "test_engine_worlds.py", "test_many_vectors.py", "test_import.py",
     "test_reports.py", "test_kills_and_clusters.py", "test_transducers.py", "test_posterior.py",
     "test_commands.py", "test_hostile_rules.py", "test_contract_script.py", "test_named_law.py",
-    "test_packages_left_out.py", "test_constants_by_mode.py", "test_loop.py", "test_pages.py",
+    "test_pages_of_the_guide.py", "test_constants_by_mode.py", "test_loop.py", "test_pages.py",
     "test_structure.py", "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
     "test_estimators.py", "test_rolie_poly_blend.py",
     "test_modulus_errors.py", "test_flows_of_fluids.py", "test_law_choice.py",

@@ -24,16 +24,13 @@ class Spoken(NotebookView):
         yield pd.DataFrame({"x": ["<b>"], "y": [None]})
 
 
-def test_parts_are_shown_in_their_order_and_escaped():
+def test_parts_are_shown_in_order_and_escaped_and_a_counted_index_is_not_shown():
     shown = Spoken()._repr_html_()
     assert shown.startswith("<p>1 &lt; 2</p><table")
     assert "&lt;b&gt;" in shown
     assert "<th>y</th>" not in shown  # nothing in that column
     assert as_html(Spoken()) == shown
     assert as_html(pd.DataFrame()) == ""
-
-
-def test_a_named_index_is_shown_and_a_counted_one_is_not():
     counted = pd.DataFrame({"x": [1.0, np.nan]})
     assert "<th>1</th>" not in as_html(counted)
     assert "–" in as_html(counted)
@@ -65,12 +62,9 @@ def test_what_was_found_out_about_a_law_shows_itself(result, words):
         assert word in shown
 
 
-def test_lists_of_findings_become_tables():
+def test_lists_become_tables_and_an_equation_shows_modes_and_where_it_was_tested():
     assert table_of([TWIN]).loc[0, ["proof", "N2_apart"]].tolist() == ["series", 0.2]
     assert table_of([]).empty
-
-
-def test_an_equation_shows_modes_and_where_it_was_tested():
     tested = WhereTested(Box((1.0, 2.0), (0.25, 1.0)), None)
     terms = (LawTerm("sigma.sigma", 0.2),)
     shown = Equation(terms, (120.0, 30.0), (0.7, 2.5), tested=tested)._repr_html_()
@@ -92,14 +86,11 @@ def outcome(**details):
     return LearnerOutcome("tensor_sindy", (term,), 1.0, details, "ended")
 
 
-def test_the_path_has_the_best_law_of_each_size_and_probable_terms():
+def test_the_path_has_the_best_law_of_each_size_and_a_learner_without_one_empty_tables():
     table = outcome(path=PATH).path_table()
     assert table["terms"].tolist() == ["no term", "sigma.sigma"]
     likely = outcome(inclusion={"sigma.sigma": 0.9})
     assert likely.inclusion_table()["probability"].tolist() == [0.9]
-
-
-def test_a_learner_without_a_path_has_empty_tables():
     without = outcome()
     for table in (without.path_table(), without.inclusion_table()):
         assert table.empty

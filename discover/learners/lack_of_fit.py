@@ -85,11 +85,11 @@ def _with_terms_as_effects(model: DeclaredModel) -> DeclaredModel:
     if not isinstance(terms, LibraryExpansion):
         return model
     effects = built_in_effects()
-    known = tuple(
-        KnownEffect(effects[name], (float(value),))
-        for name, value in zip(terms.library.names, np.asarray(terms.coefficients), strict=True)
-        if value != 0.0
-    )
+    values = zip(terms.library.names, np.asarray(terms.coefficients), strict=True)
+    present = {name: float(value) for name, value in values if value != 0.0}
+    if not present.keys() <= effects.keys():
+        return model
+    known = tuple(KnownEffect(effects[name], (value,)) for name, value in present.items())
     core = UpperConvectedMaxwell(law.linear_relaxation) if below is None else below
     return replace(model, law=core, effects=known)
 

@@ -89,7 +89,6 @@ def worker_with_stand_in(folder):
 
 
 def computed(folder):
-    """How often each part of each study was computed."""
     return Counter((folder / "counts.txt").read_text().splitlines())
 
 
@@ -166,7 +165,6 @@ def test_what_ended_before_an_interruption_is_on_the_page(studies, calm, tmp_pat
 
 
 def at_work(out):
-    """Processes that hold the folder of a study."""
     pids = set()
     for lock in out.glob(f"*/{LOCK_FILE}"):
         with contextlib.suppress(OSError, ValueError, IndexError):

@@ -84,7 +84,7 @@ def statuses():
     )
 
 
-def test_the_page_says_what_failed_and_how_the_others_ended():
+def test_the_page_says_what_failed_and_needs_no_network_nor_a_script_for_its_rows():
     page = batch_page(statuses())
     assert "<script>x" not in page
     assert "a &lt;b&gt;reason&lt;/b&gt;" in page
@@ -92,9 +92,6 @@ def test_the_page_says_what_failed_and_how_the_others_ended():
     assert 'href="good/report.html"' in page
     assert "script%3E" not in page  # a failed study has no link
     assert "Added." in page
-
-
-def test_the_page_needs_no_network_and_its_rows_no_script():
     page = batch_page(statuses())
     assert not re.findall(r"""(?:src|href)\s*=\s*["'](?:https?:)?//""", page)
     assert page.count("<script>") == 1
@@ -107,16 +104,13 @@ def test_the_page_needs_no_network_and_its_rows_no_script():
     assert 'data-value="2.0"' in tables
 
 
-def test_the_table_does_not_depend_on_times_and_holds_the_reason_of_a_failure(tmp_path):
+def test_the_table_depends_on_no_times_and_holds_failures_and_a_notebook_shows_it(tmp_path):
     table = BatchResult(statuses(), tmp_path / "index.html").table()
     assert table["study"].tolist() == ["good", "loop", "<script>x", "later"]
     # done now or complete before: the same line
     assert table["outcome"].tolist() == ["result", "result", "failed", "waiting"]
     assert table["text"].tolist() == ["Found.", "Added.", "a <b>reason</b>", ""]
     assert not {"seconds", "status"} & set(table.columns)
-
-
-def test_a_batch_shows_itself_in_a_notebook(tmp_path):
     shown = BatchResult(statuses(), tmp_path / "index.html")._repr_html_()
     assert "Added." in shown
     assert "<script>x" not in shown

@@ -37,8 +37,10 @@ next = { weissenberg_numbers = [1.0], deborah_numbers = [1.0] }
 """
 
 
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+def invoke(*arguments, code=None):
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert code is None or done.exit_code == code, done.output
+    return done
 
 
 @pytest.fixture
@@ -78,13 +80,11 @@ def data_folder(path, **columns):
 def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, monkeypatch):
     study, out = tmp_path / "s.toml", tmp_path / "out"
     study.write_text(STUDY)
-    first = invoke("compare", study, "--out", out)
-    assert first.exit_code == 0, first.output
+    first = invoke("compare", study, "--out", out, code=0)
     for name in ("report.html", "comparison.json", "equations.tex"):
         assert (out / name).is_file()
     assert str(out / "report.html") in first.output.replace("\n", "")
-    again = invoke("compare", study, "--out", out)
-    assert again.exit_code == 0
+    again = invoke("compare", study, "--out", out, code=0)
     assert "complete; use --overwrite" in again.output
     assert sorted(trained) == ["tbnn_ude", "tensor_sindy"]  # side by side, in either order
     law = json.loads(invoke("export", out, "--format", "json", "--law", "tbnn_ude").stdout)
@@ -100,8 +100,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
         fresh = invoke("compare", study, "--out", out, "--overwrite", "--json")
     assert len(trained) == 4
     assert json.loads(fresh.stdout) == json.loads(before)
-    other = invoke("compare", study, "--out", out, "--seed", "7")
-    assert other.exit_code == 2
+    other = invoke("compare", study, "--out", out, "--seed", "7", code=2)
     assert "--overwrite" in other.stderr
 
 
@@ -125,8 +124,7 @@ def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
     (tmp_path / "s.toml").write_text(ONE_RUN)
     with monkeypatch.context() as patch:
         patch.setattr(module, "train", interrupted)
-        result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 130
+        result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out", code=130)
     assert "run the same command again" in result.stderr
     result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out", "--quiet")
     assert (result.exit_code, result.output) == (0, "")
@@ -139,17 +137,14 @@ def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, tra
     to_fit += '[loop]\nnoise = 0.01\nmax_effects = 1\neffects = ["stress_offset"]'
     study = STUDY + '[model]\nlaw = "giesekus"\nparameters = {alpha = "fit"}\n' + to_fit
     (tmp_path / "s.toml").write_text(study)
-    result = invoke("close-loop", tmp_path / "s.toml", "--out", tmp_path / "loop")
-    assert result.exit_code == 0, result.stderr
+    invoke("close-loop", tmp_path / "s.toml", "--out", tmp_path / "loop", code=0)
     loop = json.loads((tmp_path / "loop" / "loop.json").read_text())
     assert loop["noise_floor"] == 0.01  # as the study says, not as estimated
     mobility = loop["declared_parameters"]["alpha"]
     low, high = mobility["ci95"]
     assert low - (high - low) < 0.2 < high + (high - low)  # twice the 95 % interval
-    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.stderr
-    page = (tmp_path / "out" / "report.html").read_text()
-    assert "fitted)" in page
+    invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out", code=0)
+    assert "fitted)" in (tmp_path / "out" / "report.html").read_text()
 
 
 BAD_STUDIES = {
@@ -182,8 +177,7 @@ def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, cas
     data_folder(tmp_path / "spoiled", stress_Pa=np.where(np.arange(12) == 4, np.nan, 1.0))
     if text is not None:
         (tmp_path / "bad.toml").write_text(text)
-    result = invoke(command, tmp_path / "bad.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
+    result = invoke(command, tmp_path / "bad.toml", "--out", tmp_path / "out", code=2)
     assert word in result.stderr
     first, *problems = result.stderr.strip().split("\n")
     assert first.startswith("discover: ")
@@ -196,17 +190,14 @@ def test_data_commands(tmp_path, monkeypatch):
     data_folder(tmp_path / "mine")
     monkeypatch.setenv("DISCOVER_DATA", str(tmp_path))
     assert "mine" in invoke("data", "list").output
-    shown = invoke("data", "show", "mine")
-    assert shown.exit_code == 0
+    shown = invoke("data", "show", "mine", code=0)
     assert "r0.csv" in shown.output
     assert json.loads(invoke("data", "show", "mine", "--json").stdout)["runs"][0]["samples"] == 12
-    assert invoke("data", "check", "mine").exit_code == 0
+    invoke("data", "check", "mine", code=0)
     bad = data_folder(tmp_path / "bad", time_s=np.zeros(12))
-    result = invoke("data", "check", bad)
-    assert result.exit_code == 2
-    assert "r0.csv" in result.stderr
+    assert "r0.csv" in invoke("data", "check", bad, code=2).stderr
     monkeypatch.delenv("DISCOVER_DATA")
-    assert invoke("data", "list").exit_code == 2
+    invoke("data", "list", code=2)
 
 
 def test_a_batch_goes_on_past_a_study_that_fails(tmp_path, trained, undrawn):
@@ -214,8 +205,7 @@ def test_a_batch_goes_on_past_a_study_that_fails(tmp_path, trained, undrawn):
     (tmp_path / "good.toml").write_text(ONE_RUN)
     (tmp_path / "bad.toml").write_text("[data]\n")
     studies = (tmp_path / "bad.toml", tmp_path / "good.toml")
-    result = invoke("batch", *studies, "--out", tmp_path / "b")
-    assert result.exit_code == 2
+    invoke("batch", *studies, "--out", tmp_path / "b", code=2)
     table = json.loads((tmp_path / "b" / "batch.json").read_text())["studies"]
     assert [row["status"] for row in table] == ["failed", "done"]
     assert "bad.toml" in table[0]["text"]
@@ -233,18 +223,10 @@ def test_a_batch_refuses_two_studies_for_one_folder(tmp_path, names):
     (tmp_path / "a.toml").write_text(STUDY + "[loop]\n")
     (tmp_path / "A.toml").write_text(STUDY)
     (tmp_path / "a-loop.toml").write_text(STUDY)
-    result = invoke(
-        "batch", *(tmp_path / f"{name}.toml" for name in names), "--out", tmp_path / "b"
-    )
-    assert result.exit_code == 2
+    studies = [tmp_path / f"{name}.toml" for name in names]
+    result = invoke("batch", *studies, "--out", tmp_path / "b", code=2)
     assert "Two studies would write to the folder" in result.stderr
     assert result.stderr.count("\n") == 1
-
-
-def test_nothing_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
-    monkeypatch.setenv("DISCOVER_NO_CACHE", "1")
-    assert enable_compilation_cache(tmp_path / "compiled") is None
-    assert not (tmp_path / "compiled").exists()
 
 
 COMPLETED = """
@@ -272,16 +254,16 @@ def test_completion_knows_commands_and_options():
 
 def test_a_folder_in_place_of_a_study_is_answered_with_a_study(tmp_path):
     (tmp_path / "a.csv").write_text("time_s\n")
-    bare = CliRunner().invoke(app, ["close-loop", str(tmp_path)])
-    assert bare.exit_code == 2
-    assert "Give a study file" in bare.stderr
+    assert "Give a study file" in invoke("close-loop", tmp_path, code=2).stderr
     (tmp_path / "melt.toml").write_text("")
-    meant = CliRunner().invoke(app, ["close-loop", str(tmp_path)])
+    meant = invoke("close-loop", tmp_path)
     assert "Did you mean" in meant.stderr
     assert "melt.toml" in meant.stderr
 
 
-def test_whole_programs_are_left_and_broken_ones_go(tmp_path):
+def test_whole_programs_are_left_broken_ones_go_and_nothing_is_kept_where_the_user_says_so(
+    tmp_path, monkeypatch
+):
     whole = zlib.compress(b"program " * 1000)
     contents = {"jit_a": whole, "jit_b": whole[:-3], "jit_c": b"", "jit_d": b"nonsense"}
     for name, content in contents.items():
@@ -290,3 +272,6 @@ def test_whole_programs_are_left_and_broken_ones_go(tmp_path):
     remove_cut_short(tmp_path)
     left = sorted(path.name.partition("-")[0] for path in tmp_path.glob("*-cache"))
     assert left == ["jit_a", "web"]
+    monkeypatch.setenv("DISCOVER_NO_CACHE", "1")
+    assert enable_compilation_cache(tmp_path / "compiled") is None
+    assert not (tmp_path / "compiled").exists()

@@ -21,8 +21,17 @@ from discover.loop.parts import ConstantByMode, DeclaredEffect, ModeConstant, Ne
 from tensor_library import LawTerm
 
 
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+def invoke(*arguments, code=None):
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert code is None or done.exit_code == code, done.output
+    return done
+
+
+def module_at(path):
+    spec = importlib.util.spec_from_file_location("law", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture
@@ -39,25 +48,27 @@ def results(tmp_path):
     return tmp_path / "out"
 
 
-def test_a_comparison_becomes_a_function_that_says_where_it_was_tested(results, tmp_path):
-    done = invoke("export", results, "--out", tmp_path / "law.py")
-    assert done.exit_code == 0, done.output
-    spec = importlib.util.spec_from_file_location("law", tmp_path / "law.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+def test_a_comparison_becomes_a_function_that_says_where_it_was_tested_and_replaces_no_result(
+    results, tmp_path
+):
+    invoke("export", results, "--out", tmp_path / "law.py", code=0)
+    module = module_at(tmp_path / "law.py")
     assert module.TESTED["judged_in"] == {"Wi": [2.0, 3.0], "De": [0.1, 1.5]}
     stress, _, _ = module.simulate_shear(lambda t: 0.01, np.array([0.0, 20.0]))
     assert stress[-1] == pytest.approx(0.01, rel=1e-3)  # slow flow: the viscosity Gλ = 1
-    again = invoke("export", results, "--out", tmp_path / "law.py")
-    assert again.exit_code == 2
+    again = invoke("export", results, "--out", tmp_path / "law.py", code=2)
     assert "--overwrite" in again.stderr
+    before = (results / "comparison.json").read_bytes()
+    itself = results / "comparison.json"
+    done = invoke("export", results, "--out", itself, "--overwrite", code=2)
+    assert "not written over" in done.stderr
+    assert itself.read_bytes() == before
+    invoke("export", results, "--out", results / "law.py", "--overwrite", code=0)
 
 
 def test_every_form_and_either_learner_can_be_asked_for(results):
     for form in ("python", "sympy", "latex", "json", "rheotool", "ufl"):
-        done = invoke("export", results, "--format", form)
-        assert done.exit_code == 0, done.output
-        assert "0.2" in done.stdout
+        assert "0.2" in invoke("export", results, "--format", form, code=0).stdout
     network = invoke("export", results, "--format", "json", "--law", "tbnn_ude")
     content = json.loads(network.stdout)
     assert content["terms"][0]["coefficient"] == 0.25
@@ -75,8 +86,7 @@ def test_every_form_and_either_learner_can_be_asked_for(results):
     ],
 )
 def test_a_wrong_request_is_one_line_and_exit_code_2(results, arguments, word):
-    done = invoke("export", results, *arguments)
-    assert done.exit_code == 2
+    done = invoke("export", results, *arguments, code=2)
     assert done.stderr.strip().count("\n") == 0
     assert word in done.stderr
 
@@ -89,49 +99,33 @@ def test_a_wrong_request_is_one_line_and_exit_code_2(results, arguments, word):
         ("comparison.json", "{}", "--overwrite"),
         ("comparison.json", '{"learners": {"tensor_sindy": {"law": {}}}}', "format"),
         ("loop.json", '{"law": null, "law_missing": "thixotropy has a state"}', "thixotropy"),
-        (
-            "fit.json",
-            '{"law": "a law of mine", "answer_law": null}',
-            "a law of mine has no written",
-        ),
+        ("fit.json", '{"law": "a law of mine", "answer_law": null}', "a law of mine has no"),
         ("batch.json", "{}", "one study"),
         ("nothing.txt", "", "none of comparison.json, loop.json and fit.json"),
     ],
 )
 def test_results_that_hold_no_law_say_so(tmp_path, name, text, word):
     (tmp_path / name).write_text(text)
-    done = invoke("export", tmp_path)
-    assert done.exit_code == 2
+    done = invoke("export", tmp_path, code=2)
     assert word in done.stderr
     assert "Traceback" not in done.output
 
 
 def loop_result(*added, base=("giesekus", {"alpha": 0.1}), **more):
-    """A closed loop that added effects, given as (name, parameters...)."""
     effects = tuple(make_effect(name) for name, *_ in added)
     stages = tuple(
         Stage(
-            effect.name,
-            effect.kind,
-            {effect.parameters[0].name: StageParameter(values[0], (0.0, 1.0), "")},
-            (),
-            ErrorPair(0.1, 0.1),
-            10.0,
-            effect.equation,
-            effect.source,
-            effect.check,
+            effect.name, effect.kind,
+            {effect.parameters[0].name: StageParameter(values[0], (0.0, 1.0), "")}, (),
+            ErrorPair(0.1, 0.1), 10.0, effect.equation, effect.source, effect.check,
         )
         for effect, (_, *values) in zip(effects, added, strict=True)
-    )
+    )  # fmt: skip
     inside = [
         (e, jnp.asarray(v)) for e, (_, *v) in zip(effects, added, strict=True)
         if e.kind == "constitutive"
     ]  # fmt: skip
-    law = AugmentedLaw(
-        make_law(*base),
-        tuple(v for _, v in inside),
-        tuple(e for e, _ in inside),
-    )
+    law = AugmentedLaw(make_law(*base), tuple(v for _, v in inside), tuple(e for e, _ in inside))
     t = np.linspace(0.0, 10.0, 5)
     records = tuple(
         RunRecord(f"{held}", held, t, t, t, np.full(5, rate), t, np.stack([t]), np.zeros(1))
@@ -148,18 +142,14 @@ def test_a_loop_leaves_as_its_fluid_without_the_instrument(tmp_path):
     result.write_json(tmp_path / "loop.json")
     assert str(result.sympy()) == "0.3*Trace(sigma)*sigma + 0.15*sigma**2"
     assert result.latex() == result.equation().latex()
-    done = invoke("export", tmp_path, "--format", "json")
-    assert done.exit_code == 0, done.output
-    content = json.loads(done.stdout)
+    content = json.loads(invoke("export", tmp_path, "--format", "json", code=0).stdout)
     found = {t["term"]: t["coefficient"] for t in content["terms"]}
     assert found == pytest.approx({"sigma.sigma": 0.15, "tr(sigma)*sigma": 0.3})
     assert [m["modulus_Pa"] for m in content["modes"]] == [10.0, 20.0]
     assert "rate_gain" in " ".join(content["notes"])
     time = (10 * 0.5**2 + 20 * 2.0**2) / (10 * 0.5 + 20 * 2.0)
-    assert content["tested"]["judged_in"] == {
-        "Wi": pytest.approx([4 * time] * 2),
-        "De": pytest.approx([time / 10] * 2),
-    }
+    judged = {"Wi": [4 * time] * 2, "De": [time / 10] * 2}
+    assert content["tested"]["judged_in"] == {k: pytest.approx(v) for k, v in judged.items()}
 
 
 XPP = {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1}
@@ -176,8 +166,7 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
     for base in (("xpp", XPP), ("giesekus", {"alpha": 0.1})):
         differing = {"alpha": by_mode((0.1, 0.3))}
         loop_result(base=base, declared_parameters=differing).write_json(tmp_path / "loop.json")
-        done = invoke("export", tmp_path, "--format", "rheotool")
-        assert done.exit_code == 0, done.output
+        done = invoke("export", tmp_path, "--format", "rheotool", code=0)
         values = re.findall(r"alpha \[0 0 0 0 0 0 0\] (\S+);", done.stdout)
         assert [float(v) for v in values] == [0.1, 0.3]
         content = json.loads(invoke("export", tmp_path, "--format", "json").stdout)
@@ -207,29 +196,26 @@ def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_that_law_in_rheotool(
     assert read_result_laws(tmp_path)["augmented"].named.law == law
 
 
-def test_a_constant_by_mode_that_a_rounding_takes_beyond_its_range_is_written_at_its_end():
+def test_a_constant_by_mode_beyond_its_range_by_a_rounding_is_at_its_end_and_beside_terms_refused(
+    tmp_path,
+):
     differing = {"alpha": by_mode((0.1, np.nextafter(1.0, 2.0)))}
     named = loop_result(declared_parameters=differing).equation().named
     assert [one["alpha"] for one in named.constants] == [0.1, 1.0]
-
-
-def test_an_effect_by_mode_beside_a_law_with_terms_is_refused_with_its_name(tmp_path):
     effect = DeclaredEffect("giesekus_mobility", "constitutive", {"alpha": by_mode((0.1, 0.3))})
     loop_result(declared_effects=(effect,)).write_json(tmp_path / "loop.json")
     assert "giesekus_mobility differs" in invoke("export", tmp_path).stderr
 
 
-@pytest.mark.parametrize("case", ["yield", "state"])
-def test_a_loop_whose_law_is_no_sum_of_terms_says_why(tmp_path, case):
-    result = loop_result(("yield_stress", 0.1))
-    if case == "state":
-        result = replace(loop_result(("thixotropy", 0.1, 2.0)), fluid=None)
-    said = "written form" if case == "state" else "cannot be written out"
+@pytest.mark.parametrize(
+    ("effect", "said"), [("yield_stress", "cannot be written out"), ("thixotropy", "written form")]
+)
+def test_a_loop_whose_law_is_no_sum_of_terms_says_why(tmp_path, effect, said):
+    result = loop_result((effect, 0.1, *([2.0] if effect == "thixotropy" else [])))
+    result = replace(result, fluid=None) if effect == "thixotropy" else result
     assert said in result._repr_html_().replace("&#x27;", "'")
     result.write_json(tmp_path / "loop.json")
-    done = invoke("export", tmp_path)
-    assert done.exit_code == 2
-    assert ("yield_stress" if case == "yield" else "thixotropy") in done.stderr
+    assert effect in invoke("export", tmp_path, code=2).stderr
 
 
 def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
@@ -244,18 +230,8 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
     # ds/dt = (1 - s)/t_b - k |rate| s
     assert rate == pytest.approx(0.5 / 2.0 - 0.1 * 3.0 * 0.5)
     assert read_result_laws(tmp_path)["augmented"].states == (part,)
-    refused = invoke("export", tmp_path, "--format", "rheotool")
-    assert refused.exit_code == 2
+    refused = invoke("export", tmp_path, "--format", "rheotool", code=2)
     assert "cannot be exported to rheoTool: it has a structure" in refused.stderr
-
-
-def test_an_export_does_not_write_over_the_result_that_it_reads(results):
-    before = (results / "comparison.json").read_bytes()
-    done = invoke("export", results, "--out", results / "comparison.json", "--overwrite")
-    assert done.exit_code == 2
-    assert "not written over" in done.stderr
-    assert (results / "comparison.json").read_bytes() == before
-    assert invoke("export", results, "--out", results / "law.py", "--overwrite").exit_code == 0
 
 
 def test_the_nearest_classical_law_stands_in_the_result_and_is_exported_in_place_of_the_answer(
@@ -267,12 +243,10 @@ def test_the_nearest_classical_law_stands_in_the_result_and_is_exported_in_place
     said = json.loads((tmp_path / "loop.json").read_text())["nearest_law"]
     assert (said["law"], said["size"]) == ("giesekus", 0.12)
     assert said["constants"]["alpha"] == {"value": 0.1, "ci95": [0.05, 0.2], "unit": "1"}
-    exported = invoke("export", tmp_path, "--format", "python")
-    assert exported.exit_code == 0, exported.output
-    assert "0.137" in exported.stdout
+    assert "0.137" in invoke("export", tmp_path, "--format", "python", code=0).stdout
     # negative control: without one the law that cannot be written out is refused
     loop_result(("yield_stress", 0.1)).write_json(tmp_path / "loop.json")
-    assert invoke("export", tmp_path, "--format", "python").exit_code == 2
+    invoke("export", tmp_path, "--format", "python", code=2)
 
 
 HERSCHEL_BULKLEY = {"yield_stress_Pa": 12.0, "consistency_Pa_sn": 4.0, "flow_index": 0.5}
@@ -283,7 +257,6 @@ CARREAU_YASUDA = {
 
 
 def result(folder, law, constants, **changed):
-    """Write what an export reads of a result."""
     numbers = {name: {"value": v, "ci95": [0.9 * v, 1.1 * v]} for name, v in constants.items()}
     use = {"law": law, "constants": numbers, "range": {"rate_1_s": [0.01, 100.0]},
            "expected_error": {"sigma12": 0.02}} | changed  # fmt: skip
@@ -321,23 +294,18 @@ def test_a_fluid_without_elasticity_leaves_with_its_constants_size_and_range(
         f"{float(v):g}" for v in found.values() if v.replace(".", "").isdigit()
     }
     file = tmp_path / "law.py"
-    assert invoke("export", folder, "--out", file).exit_code == 0
-    spec = importlib.util.spec_from_file_location("law", file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.stress(4.0) == pytest.approx(stress, rel=1e-5)  # six digits are written
+    invoke("export", folder, "--out", file, code=0)
+    assert module_at(file).stress(4.0) == pytest.approx(stress, rel=1e-5)  # six digits are written
     for said in (text, file.read_text("utf-8")):
         assert "0.01–100 1/s" in said
         assert "σ12 2 %" in said
 
 
 def test_a_format_or_a_result_that_is_none_is_refused_in_words(tmp_path):
-    folder = result(tmp_path / "out", "kelvin_voigt", {"elastic_modulus_Pa": 9.0,
-                                                       "viscosity_Pa_s": 1.0})  # fmt: skip
-    refused = invoke("export", folder, "--format", "rheotool")
-    assert refused.exit_code == 2
+    solid = {"elastic_modulus_Pa": 9.0, "viscosity_Pa_s": 1.0}
+    folder = result(tmp_path / "out", "kelvin_voigt", solid)
+    refused = invoke("export", folder, "--format", "rheotool", code=2)
     assert "has no format 'rheotool'. Write one of: python, latex, json" in refused.stderr
-    damaged = result(tmp_path / "bad", "newtonian", {})
-    assert invoke("export", damaged).exit_code == 2
+    invoke("export", result(tmp_path / "bad", "newtonian", {}), code=2)
     other = result(tmp_path / "giesekus", "giesekus", {"alpha": 0.2})
     assert "no" in invoke("export", other).stderr  # the reason that the result gives

@@ -40,12 +40,9 @@ with obeying_interrupts(), on_stop(words):
 def interrupted(*arguments):
     """What a program says that hears Ctrl-C as from a terminal, its exit code, and the wait."""
     process = subprocess.Popen(
-        [sys.executable, "-c", AT_WORK, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+        [sys.executable, "-c", AT_WORK, *arguments], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
     assert process.stdout.readline() == "at work\n"
     started = time.monotonic()
     os.killpg(process.pid, signal.SIGINT)
@@ -56,14 +53,11 @@ def interrupted(*arguments):
     return out, err, process.returncode, time.monotonic() - started
 
 
-def test_a_call_that_python_cannot_interrupt_is_left_with_one_line():
+def test_a_call_that_python_cannot_interrupt_is_left_with_one_line_and_last_words_cut_short():
     out, err, code, seconds = interrupted("10.0", "0.0")
     assert (out, err, code) == ("last words\n", "discover: interrupted.\n", INTERRUPTED_CODE)
     assert INTERRUPTED_CODE == 130
     assert seconds < 15  # and not the hour that the call takes
-
-
-def test_last_words_that_do_not_end_are_cut_short():
     out, err, code, _ = interrupted("0.2", "60.0")
     assert (out, err, code) == ("", "discover: interrupted.\n", INTERRUPTED_CODE)
 
@@ -101,11 +95,7 @@ def ended_with(error):
         (KeyboardInterrupt(), 130, "interrupted."),
         (InputError("there is no run 'a'"), 2, "there is no run 'a'"),
         (PermissionError(13, "Permission denied", "out"), 1, "out"),
-        (
-            RuntimeError("it broke\nin two lines"),
-            1,
-            "RuntimeError: it broke (not your input's fault",
-        ),
+        (RuntimeError("it broke\nin two"), 1, "RuntimeError: it broke (not your input's fault"),
     ],
 )
 def test_each_end_has_a_code_of_its_own_and_says_what_to_do(error, code, said, monkeypatch):
@@ -115,11 +105,8 @@ def test_each_end_has_a_code_of_its_own_and_says_what_to_do(error, code, said, m
     assert said in done.stderr
     assert done.stderr.strip().count("\n") == 0
     assert done.stdout == ""
-
-
-def test_a_command_that_ends_well_says_nothing():
-    done = ended_with(typer.Exit())
-    assert (done.exit_code, done.output) == (0, "")
+    well = ended_with(typer.Exit())  # the control
+    assert (well.exit_code, well.output) == (0, "")
 
 
 def test_what_was_finished_is_kept_only_once_there_is_a_folder(tmp_path, monkeypatch):

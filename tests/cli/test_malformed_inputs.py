@@ -33,12 +33,9 @@ def nothing_is_computed():
 
 @pytest.mark.usefixtures("as_users_run_it")
 @settings(
-    max_examples=20,
-    deadline=None,
-    derandomize=True,
-    database=None,
+    max_examples=20, deadline=None, derandomize=True, database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+)  # fmt: skip
 @given(kind=st.sampled_from(list(KINDS)), seed=st.integers(0, 10**6))
 def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
     with tempfile.TemporaryDirectory() as root:
@@ -95,10 +92,8 @@ def test_a_fault_of_the_software_is_seen(tmp_path, monkeypatch, error):
     monkeypatch.setattr("discover.dataset.checking.folder.read_index", fail)
     harm.write_files(tmp_path, harm.SANE["FOLDER"])
     case = Case(["data", "check", str(tmp_path)])
-    assert complaint(case, malformed.run_call(case.call)) in (
-        "fails in the software",
-        "ends with 1",
-    )
+    said = complaint(case, malformed.run_call(case.call))
+    assert said in ("fails in the software", "ends with 1")
 
 
 def test_a_reader_that_waits_for_ever_is_late(tmp_path, monkeypatch):
@@ -136,19 +131,15 @@ def test_a_damaged_result_is_not_taken_for_a_complete_one(tmp_path):
 
 def test_a_batch_says_its_failures_on_standard_error_however_quiet(tmp_path):
     (tmp_path / "s.toml").write_text("[data]\n")
-    outcome = malformed.run_call(
-        ["batch", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--quiet"]
-    )
+    words = ["batch", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--quiet"]
+    outcome = malformed.run_call(words)
     assert outcome.code == 2
     assert outcome.stdout == ""
     assert outcome.stderr.startswith("discover: s (compare): ")
 
 
-def test_a_study_named_by_dots_cannot_write_beside_the_folder_of_results():
+def test_a_study_named_by_dots_or_as_a_file_of_the_batch_gets_a_folder_within_the_results():
     assert folder_names([Path("...toml"), Path("a.toml")]) == ["study", "a"]
-
-
-def test_a_study_with_the_name_of_a_file_of_the_batch_gets_a_folder_of_another():
     paths = [Path("batch.json.toml"), Path("Index.HTML.toml"), Path("table.toml")]
     assert folder_names(paths) == ["study-batch.json", "study-Index.HTML", "table"]
     with pytest.raises(InputError):

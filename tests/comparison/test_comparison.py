@@ -1,26 +1,29 @@
-"""Comparing learners: errors, what stays open, and how parts side by side end."""
+"""Comparing learners: errors, how parts side by side end, and one answer with `close-loop`."""
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from independent import Giesekus, multimode_giesekus, oscillation, start_up
+from independent.folders import write_folder
+from independent.instruments import Instrument
+from independent.noise import white
 
+import discover as dc
 from discover.comparison import relative_errors
 from discover.comparison.flows import true_terms
 from discover.comparison.hypotheses import at_once
 from discover.progress import Stopped, require_wanted, silent
 
 
-def test_n2_error_is_relative_to_n1():
+def test_n2_error_is_relative_to_n1_and_what_was_not_measured_has_no_error():
     reference = {"sigma12": np.ones(4), "N1": 2.0 * np.ones(4), "N2": np.zeros(4)}
     prediction = {"sigma12": 1.1 * np.ones(4), "N1": 2.0 * np.ones(4), "N2": 0.2 * np.ones(4)}
     errors = relative_errors(prediction, reference)
     assert errors["sigma12"] == pytest.approx(0.1)
     assert errors["N1"] == 0.0
     assert errors["N2"] == pytest.approx(0.1)
-
-
-def test_what_was_not_measured_has_no_error():
     errors = relative_errors({"sigma12": np.ones(3), "N1": np.ones(3), "N2": np.ones(3)},
                              {"sigma12": np.ones(3)})  # fmt: skip
     assert errors == {"sigma12": 0.0, "N1": None, "N2": None}
@@ -76,3 +79,47 @@ def test_an_interrupt_of_the_caller_ends_all_parts():
 
     with pytest.raises(KeyboardInterrupt):
         at_once({"one": goes_on, "other": goes_on}, interrupted)
+
+
+MODULUS, MOBILITY = 100.0, 0.3
+FLOWS = {
+    "up.csv": (start_up(1.0), 6.0),
+    "fast_up.csv": (start_up(3.0), 5.0),
+    "wide.csv": (oscillation(3.0, 0.5), 14.0),
+}
+HELD_OUT = {"faster_up.csv": (start_up(5.0), 4.0)}
+EFFECTS = ["giesekus_mobility", "stress_gain", "ptt_linear"]
+
+
+def asked(tmp_path, material, recorded):
+    """Return what both say of a material whose stress is recorded so, told a Maxwell fluid."""
+    generator = np.random.default_rng(5)
+    runs = {}
+    for name, (flow, end) in {**FLOWS, **HELD_OUT}.items():
+        record = Instrument().record(material, flow, np.linspace(0.02, end, 60))
+        runs[name] = replace(record, stress=recorded(record.stress, generator))
+    data = dc.load_dataset(write_folder(tmp_path / "data", runs))
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, 1.0)
+    compared = dc.compare(
+        data, base, held_out=list(HELD_OUT), learners=["tensor_sindy"], library={"degree": 0}
+    )
+    looped = dc.close_loop(
+        data, base, held_out=list(HELD_OUT), effects=EFFECTS, max_effects=2, explanations=1
+    )
+    return compared, looped
+
+
+def noisy(stress, generator):
+    return white(stress, 0.01, generator)
+
+
+@pytest.mark.slow
+def test_of_two_modes_told_one_neither_has_an_explanation_and_in_noise_no_signal(tmp_path):
+    two = multimode_giesekus([0.1, 0.6], [60.0, 40.0], [1.0, 0.3])
+    compared, looped = asked(tmp_path, two, noisy)
+    assert (compared.verdict, looped.verdict) == ("unexplained", "unexplained")
+    compared, looped = asked(
+        tmp_path, Giesekus(MOBILITY), lambda s, g: 5.0 * g.standard_normal(len(s))
+    )
+    assert (compared.verdict, looped.verdict) == ("no_signal", "no_signal")
+    assert compared.lack_of_fit["tensor_sindy"].verdict == "no_signal"

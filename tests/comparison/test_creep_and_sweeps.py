@@ -5,6 +5,7 @@ import pytest
 from differences import nearly_giesekus, told_as_differences
 from independent import Giesekus, Modes, PhanThienTanner, start_up
 from independent.sweeps import modulus_of, strain_at
+from noisy_runs import run_at
 
 import discover as dc
 from discover.comparison.known_part import without_instrument
@@ -28,7 +29,7 @@ def modes(law, constant):
     return Modes(*(law(constant, modulus=g, relaxation_time=t) for g, t in PAIRS))
 
 
-GIESEKUS = modes(Giesekus, 0.3)
+GIESEKUS, PTT = modes(Giesekus, 0.3), modes(PhanThienTanner, 0.2)
 
 
 def noisy(values, seed, size=None):
@@ -78,7 +79,7 @@ def start(law, rate):
     times = np.linspace(0.05, 10.0, 40)
     solvent = float(base_of(law).solvent_viscosity)
     stress = noisy(law.respond(start_up(rate), times).sigma12 + solvent * rate, int(rate))
-    return dc.Run(f"at_{rate:g}", times, dc.start_up(rate), np.full(40, rate), stress)
+    return run_at(rate, times, stress, f"at_{rate:g}")
 
 
 def compared(runs, base=BASE, **options):
@@ -93,10 +94,8 @@ def found_by_sindy(runs, library=LIBRARY):
 
 
 def few_samples():
-    return [
-        creep(GIESEKUS, 40.0).window(np.arange(40) % 4 == 0),
-        *sweep(GIESEKUS, np.array([0.1, 2.0])).records,
-    ]
+    fewer = creep(GIESEKUS, 40.0).window(np.arange(40) % 4 == 0)
+    return [fewer, *sweep(GIESEKUS, np.array([0.1, 2.0])).records]
 
 
 @pytest.mark.slow
@@ -115,12 +114,8 @@ def test_the_network_is_told_of_creep_and_moduli_as_their_differences_say():
         (lambda: [creep(GIESEKUS, 20.0), creep(GIESEKUS, 60.0)], 0, "sigma.sigma", 0.3),
         (lambda: [creep(GIESEKUS, 60.0, off=TIMES[30])], 0, "sigma.sigma", 0.3),
         (lambda: [sweep(GIESEKUS, np.geomspace(0.05, 10.0, 14))], 0, "sigma.sigma", 0.3),
-        (
-            lambda: [creep(modes(PhanThienTanner, 0.2), s) for s in (20.0, 60.0)],
-            1,  # only a library with invariants holds this term
-            "tr(sigma)*sigma",
-            0.2,
-        ),
+        # only a library with invariants holds this term
+        (lambda: [creep(PTT, s) for s in (20.0, 60.0)], 1, "tr(sigma)*sigma", 0.2),
     ],
     ids=["creep", "recovery", "sweep", "creep of a PTT fluid"],
 )
@@ -171,7 +166,7 @@ def curve(material):
 @pytest.mark.parametrize(
     ("law", "other", "quantity", "of"),
     [
-        (GIESEKUS, modes(PhanThienTanner, 0.2), "strain", lambda law: creep(law, 40.0)),
+        (GIESEKUS, PTT, "strain", lambda law: creep(law, 40.0)),
         (ONE, PhanThienTanner(0.2, modulus=100.0), "sigma12", curve),
     ],
     ids=["creep", "flow curve"],

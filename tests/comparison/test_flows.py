@@ -38,30 +38,18 @@ def started(rate, duration=20.0):
 PAPER = [oscillation(wi, de) for de in (0.25, 0.5, 0.75, 1.0) for wi in (1.0, 2.0)]
 
 
-def test_a_fitted_flow_is_inside():
+def test_flows_are_inside_or_beyond_in_rate_frequency_and_strain():
     assert place(PAPER[3], PAPER).inside
     assert place(oscillation(0.1, 0.9), PAPER).inside
-
-
-def test_a_faster_oscillation_is_beyond_in_rate_and_frequency():
     placed = place(oscillation(3.0, 1.5), PAPER)
     assert placed.beyond == pytest.approx({"shear rate": 1.5, "frequency": 1.5})
     assert placed.text.startswith("beyond the fitted range: shear rate (Wi) 1.5 times")
-
-
-def test_a_start_up_is_beyond_in_strain_though_its_rate_was_fitted():
     # strain 40 against the largest of the eight series, 2/0.25
     placed = place(started(2.0), PAPER)
     assert placed.beyond == pytest.approx({"strain": 5.0}, rel=0.01)
     assert place(started(2.0, duration=3.0), PAPER).inside
-
-
-def test_a_step_of_the_rate_excites_every_frequency():
     assert place(oscillation(1.0, 5.0), [started(2.0)]).inside
     assert not place(oscillation(1.0, 5.0), PAPER).inside
-
-
-def test_runs_at_rest_leave_every_flow_beyond():
     placed = place(started(1.0), [started(0.0)])
     assert set(placed.beyond) == {"shear rate", "strain"}
 
@@ -70,9 +58,8 @@ def test_an_extension_is_beyond_wherever_only_shear_was_fitted():
     pull = replace(started(0.1), protocol=in_flow(start_up(0.1), "uniaxial"))
     placed = place(pull, [started(2.0)])
     assert not placed.inside
-    assert placed.text == (
-        "beyond the fitted range: uniaxial extension, of which nothing was fitted"
-    )
+    said = "beyond the fitted range: uniaxial extension, of which nothing was fitted"
+    assert placed.text == said
     assert placed.to_json()["new_flow"] == "uniaxial"
     # among extensions of its own kind it is held against those, whatever the shear was
     faster = replace(started(0.3), protocol=in_flow(start_up(0.3), "uniaxial"))
@@ -148,7 +135,7 @@ def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, opt
     assert set(seen.value.args[0]) == {expected}
 
 
-def test_a_thinned_record_is_said_and_follows_the_same_strain():
+def test_a_thinned_record_is_said_and_follows_the_same_strain_and_a_short_one_is_left():
     data = oscillations(3000)
     study = parse_study({"data": {"folder": "waves"}})
     assert "3000 samples" in data_in_words(data, study)
@@ -162,18 +149,19 @@ def test_a_thinned_record_is_said_and_follows_the_same_strain():
     whole = data.fit["0.csv"]
     kept = np.isin(whole.time, thinned.fit["0.csv"].time)
     np.testing.assert_array_equal(whole.recorded[kept], thinned.fit["0.csv"].recorded)
-
-
-def test_what_was_thinned_when_it_was_read_is_still_said():
     run = replace(oscillations(600).fit["0.csv"], metadata={"thinned": "kept 600 of 9,000 samples"})
     said = thin_run(thin_run(run, 300), 100).metadata["thinned"]
     assert said == (
         "kept 600 of 9,000 samples; of these kept 300 of 600 samples, evenly in their order; "
         "of these kept 100 of 300 samples, evenly in their order"
     )
+    data = oscillations(400)
+    thinned = thinned_to(data, 400)
+    assert all(one is other for one, other in zip(data.fit, thinned.fit, strict=True))
+    assert "kept" not in data_in_words(thinned, parse_study({"data": {"folder": "waves"}}))
 
 
-def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
+def test_a_ringing_rate_keeps_the_knots_that_it_needs_also_where_an_outlier_stood():
     times = np.linspace(0.0, 20.0, 4001)
     ringing = np.cos(times) + np.exp(-5.0 * times) * np.cos(60.0 * times)
     strain = np.sin(times) + np.real((np.exp((-5.0 + 60.0j) * times) - 1.0) / (-5.0 + 60.0j))
@@ -187,9 +175,6 @@ def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
     assert np.sum(keep) < len(knots) < 500
     # where it rings, twice as close as spread evenly
     assert np.mean(knots < 1.0) > 2.0 / 20.0
-
-
-def test_a_rate_is_followed_to_its_ends_where_an_outlier_stood_there():
     times = np.linspace(0.0, 10.0, 201)
     keep = evenly_chosen(len(times), 21)
     keep[[0, -1]] = False
@@ -198,10 +183,3 @@ def test_a_rate_is_followed_to_its_ends_where_an_outlier_stood_there():
     # the strain is right to 0.1 % of its range, 1 − cos from 0 to 2
     strain = cumulative_trapezoid(rates, knots, initial=0.0)
     assert np.max(np.abs(strain - (1.0 - np.cos(knots)))) < 2e-3
-
-
-def test_a_short_record_is_left_as_it_is():
-    data = oscillations(400)
-    thinned = thinned_to(data, 400)
-    assert all(one is other for one, other in zip(data.fit, thinned.fit, strict=True))
-    assert "kept" not in data_in_words(thinned, parse_study({"data": {"folder": "waves"}}))

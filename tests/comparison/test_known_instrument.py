@@ -5,6 +5,7 @@ import pytest
 from independent import Giesekus, oscillation, start_up
 from independent.flow import of_rate
 from independent.noise import white
+from noisy_runs import run_at
 from scipy.signal import lfilter
 
 from discover.comparison import compare
@@ -17,7 +18,6 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.loop.loop import search
 from discover.loop.task import Task
 from discover.protocols import oscillatory_shear
-from discover.protocols import start_up as commanded_start_up
 from discover.simulate import simulate
 from discover.study import RunFolder, parse_study
 from discover.study.data import StudyData
@@ -48,9 +48,7 @@ def slow_start_ups(rise_time: float, noise: float = 0.0) -> Dataset:
     for rate in (0.5, 2.0):
         felt = of_rate(lambda t, r=rate: r * -np.expm1(-np.asarray(t) / rise_time), 8.0)
         stress = Giesekus(MOBILITY).respond(felt, times).sigma12
-        stress = white(stress, noise, rng)
-        commanded = np.asarray(start_up(rate).rate(times))
-        runs.append(Run(f"{rate:g}", times, commanded_start_up(rate), commanded, stress))
+        runs.append(run_at(rate, times, white(stress, noise, rng)))
     return Dataset("slow motor", tuple(runs))
 
 
@@ -80,11 +78,9 @@ def lagging(tau):
     fine, times = np.linspace(0.0, 8.0, 8001), np.geomspace(0.02, 8.0, 40)
     kept, runs = np.exp(-fine[1] / tau), []
     for rate in (0.5, 2.0):
-        flow = start_up(rate)
-        stress = Giesekus(MOBILITY).respond(flow, fine).sigma12
+        stress = Giesekus(MOBILITY).respond(start_up(rate), fine).sigma12
         read = lfilter([0.5 * (1.0 - kept)] * 2, [1.0, -kept], stress)
-        commanded = np.asarray(flow.rate(times)), np.interp(times, fine, read)
-        runs.append(Run(f"{rate:g}", times, commanded_start_up(rate), *commanded))
+        runs.append(run_at(rate, times, np.interp(times, fine, read)))
     return Dataset("slow transducer", tuple(runs))
 
 
@@ -170,12 +166,9 @@ def trained(learner, study, model, runs, seed=0, progress=None, library=None):
 def compared(data, store=None, **model):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.comparison.learning.train", trained)
-        study = parse_study(
-            {"data": {"folder": "f"}, "compare": {"library": {"degree": 0}}, "model": model}
-        )
-        declared = with_known(
-            declared_fluid(Fluid(), data), model.get("effects"), model.get("free", ())
-        )
+        asked = {"data": {"folder": "f"}, "compare": {"library": {"degree": 0}}, "model": model}
+        study, known = parse_study(asked), (model.get("effects"), model.get("free", ()))
+        declared = with_known(declared_fluid(Fluid(), data), *known)
         whole = StudyData(data, data.select(data.names[1:]), data.select(data.names[:1]))
         return compare(study, data=whole, declared=declared, store=store)
 
@@ -197,17 +190,21 @@ def with_gain(weak, folder):
 
 
 @pytest.mark.slow
-def test_both_learners_see_the_records_without_the_gain(weak, with_gain):
+def test_both_learners_see_the_records_without_the_gain_and_what_was_kept_gives_the_same(
+    weak, with_gain, folder
+):
     known = compared(weak, effects={"stress_gain": {"gain_error": -0.1}})
     for found in (with_gain, known):
         for name in ("tensor_sindy", "tbnn_ude"):
             for flow in [*found.flows_of("training"), *found.judged]:
                 # the noise, and a gain that is known to a fraction of it
                 assert found.errors(name, flow)["sigma12"] == pytest.approx(0.01, rel=0.35)
+    again = compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
+    assert again.to_json()["learners"] == with_gain.to_json()["learners"]
 
 
 @pytest.mark.slow
-def test_without_the_gain_the_same_law_misses_by_it(weak):
+def test_without_the_gain_the_same_law_misses_by_it_and_python_takes_what_a_study_does(weak):
     found = compared(weak)
     (flow,) = found.judged
     before = found.errors("before", flow)["sigma12"]
@@ -216,16 +213,6 @@ def test_without_the_gain_the_same_law_misses_by_it(weak):
     assert found.errors("tensor_sindy", flow)["sigma12"] == pytest.approx(0.01, rel=0.35)
     # a gain that nobody declared is found all the same
     assert "stress_gain" in [stage.effect for stage in found.posterior.stages]
-
-
-@pytest.mark.slow
-def test_what_was_kept_gives_the_same_results(weak, with_gain, folder):
-    again = compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
-    assert again.to_json()["learners"] == with_gain.to_json()["learners"]
-
-
-@pytest.mark.slow
-def test_python_takes_what_a_study_does(weak):
     options = {"learners": ["tensor_sindy"], "library": {"degree": 0}, "held_out": weak.names[:1]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.comparison.learning.train", trained)
@@ -258,8 +245,7 @@ def test_a_gain_is_taken_out_of_what_its_transducer_read(name):
     seen = Giesekus(MOBILITY).respond(start_up(rate), times)
     of_force = name == "normal_force_gain"
     torque, force = (1.0, 1.15) if of_force else (1.15, 1.0)
-    protocol, rates = commanded_start_up(rate), np.full(20, rate)
-    run = Run("a", times, protocol, rates, torque * seen.sigma12, force * seen.N1)
+    run = run_at(rate, times, torque * seen.sigma12, first_normal_stress_difference=force * seen.N1)
     (found,) = taken_out(Dataset("one", (run,)), {name: {"gain_error": 0.15}})[0].fit
     for read, exact in (
         (found.stress, seen.sigma12), (found.first_normal_stress_difference, seen.N1)

@@ -74,16 +74,22 @@ def found(data):
     return compared(data)
 
 
-def test_the_gain_is_found_and_what_the_learner_saw_is_the_fluid(found):
+def test_the_gain_is_found_beside_classical_laws_the_right_one_best_and_normal_stresses_open(found):
     assert found.verdict == "explained"
-    assert {stage.effect for stage in found.posterior.stages} == {
-        "giesekus_mobility",
-        "stress_gain",
-    }
+    effects = {stage.effect for stage in found.posterior.stages}
+    assert effects == {"giesekus_mobility", "stress_gain"}
     (term,) = found.outcomes["tensor_sindy"].terms
     assert term.term == "sigma.sigma"
     assert term.ci95[0] <= MOBILITY <= term.ci95[1]
     assert found.determined_terms
+    # N2: T1 tr(γ̇²)/2 − T5 acts on σ33 alone, which σ12 never sees; N1: see above
+    assert set(found.undetermined) == {"N1", "N2"}
+    fits = {fit.law: fit for fit in found.classical}
+    best = min(found.classical, key=lambda fit: np.inf if fit.criterion is None else fit.criterion)
+    assert best.law == "giesekus"
+    low, high = best.ci95["alpha"]
+    assert low <= MOBILITY <= high
+    assert best.misfit < 1.3 * NOISE < fits["ucm"].misfit  # the negative control
 
 
 def test_the_band_of_n1_holds_the_truth_and_both_readings_of_a_tenth(found, records):
@@ -95,20 +101,6 @@ def test_the_band_of_n1_holds_the_truth_and_both_readings_of_a_tenth(found, reco
     assert 0.05 < band.half_widths()["N1"] < 0.2
     # of the record itself both say the same
     assert band.half_widths()["sigma12"] < 0.01
-
-
-def test_normal_stresses_are_open(found):
-    # N2: T1 tr(γ̇²)/2 − T5 acts on σ33 alone, which σ12 never sees; N1: see above
-    assert set(found.undetermined) == {"N1", "N2"}
-
-
-def test_classical_laws_stand_beside_the_same_gain_and_the_right_one_is_best(found):
-    fits = {fit.law: fit for fit in found.classical}
-    best = min(found.classical, key=lambda fit: np.inf if fit.criterion is None else fit.criterion)
-    assert best.law == "giesekus"
-    low, high = best.ci95["alpha"]
-    assert low <= MOBILITY <= high
-    assert best.misfit < 1.3 * NOISE < fits["ucm"].misfit  # the negative control
 
 
 def test_json_names_the_answer_and_what_the_learner_is_worth(found):

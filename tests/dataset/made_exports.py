@@ -48,7 +48,6 @@ def run(tmp_path, *arguments, code=0):
 
 
 def csv(table):
-    """Return columns of numbers as text."""
     rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
     return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
 
@@ -76,7 +75,6 @@ def sweep_table(points):
 
 
 def columns(text):
-    """Return the columns of such text."""
     head, *rows = text.splitlines()
     values = np.array([row.split(",") for row in rows], dtype=float)
     return dict(zip(head.split(","), values.T, strict=True))

@@ -137,7 +137,6 @@ BROUGHT += [(name, *case) for name, cases in OTHERS.items() for case in cases]
 def test_what_users_bring_is_refused_with_file_place_and_remedy(tmp_path, name, content, words):
     write(tmp_path, {name: content})
     message = use(tmp_path)
-    assert message is not None
     assert words in message
     assert any(file in message for file in (name, "missing.csv"))
     result = CliRunner().invoke(app, ["data", "check", str(tmp_path)])

@@ -45,11 +45,8 @@ def subjects(findings, severity="warning"):
     return {finding.subject for finding in findings if finding.severity == severity}
 
 
-def test_nothing_is_said_of_a_maxwell_fluid_with_its_own_sweep(folder):
+def test_nothing_is_said_of_a_maxwell_fluid_with_its_own_sweep_with_and_without_noise(folder):
     assert check_folder(folder(start_up(0.05), start_up(0.5), start_up(2.0))) == ()
-
-
-def test_nothing_is_said_of_it_with_one_per_cent_noise_either(folder):
     generator = np.random.default_rng(3)
     runs = []
     for rate in (0.05, 0.5, 2.0):
@@ -171,14 +168,11 @@ def wave(sign=1.0, strain_sign=1.0):
     }
 
 
-def test_a_wrong_sign_in_one_oscillation_is_doubted(folder):
+def test_a_wrong_sign_in_one_oscillation_and_a_constant_stress_are_doubted(folder):
     found = check_folder(folder(wave(), wave(sign=-1.0), wave(strain_sign=-1.0), sweep=False))
     said = {(f.file, f.subject) for f in found if f.subject in ("stress", "strain")}
     assert said == {("r1.csv", "stress"), ("r2.csv", "strain")}
     assert any("wrong sign" in f.text for f in found if f.subject == "strain")
-
-
-def test_a_constant_stress_is_doubted(folder):
     bad = start_up(stress_Pa=np.full(len(TIMES), 3.0))
     assert any("the same in every sample" in f.text for f in check_folder(folder(bad)))
 
@@ -213,13 +207,6 @@ def test_a_normal_stress_far_above_the_frequency_of_one_mode_is_not_held_against
     assert not any("Laun's rule" in f.text for f in findings)
 
 
-def test_samples_too_few_to_show_noise_are_not_lost_in_it(folder):
-    times = np.array([0.1, 1.0, 10.0])
-    said = [f.text for f in check_folder(folder(start_up(0.5, times), sweep=False))]
-    assert not any("teach nothing" in text for text in said)
-    assert any("has only 3 samples" in text for text in said)
-
-
 @pytest.mark.parametrize(("factor", "doubted"), [(1.0, False), (0.6, False), (0.1, True)])
 def test_a_steady_normal_stress_is_held_against_laun_where_cox_and_merz_hold(
     folder, factor, doubted
@@ -244,22 +231,33 @@ def test_a_normal_stress_that_no_fluid_has_is_neither_fitted_nor_judges(folder):
         load_study_data(parse_study({"data": told}))
 
 
-def test_runs_that_are_all_linear_teach_nothing(folder):
+def test_linear_runs_teach_nothing_few_samples_hide_no_noise_and_a_sweep_may_contradict_itself(
+    folder,
+):
     assert any("every run is linear" in f.text for f in check_folder(folder(start_up(0.01))))
-
-
-def test_a_sweep_that_contradicts_itself_is_doubted(folder):
     sweep = sweep_table(30)
     sweep["Gp_Pa"] = sweep["Gp_Pa"] * sweep["omega_rad_s"]
     findings = check_folder(folder(start_up(), sweep=sweep))
     assert any("contradict each other" in f.text for f in findings)
+    times = np.array([0.1, 1.0, 10.0])
+    said = [f.text for f in check_folder(folder(start_up(0.5, times), sweep=False))]
+    assert not any("teach nothing" in text for text in said)
+    assert any("has only 3 samples" in text for text in said)
 
 
-def test_a_missing_sweep_a_copy_and_a_file_left_over_are_told(folder):
+def test_a_missing_sweep_a_copy_a_file_left_over_an_unused_clock_and_sparse_cycles_are_told(folder):
     findings = check_folder(folder(start_up(), start_up(), sweep=False, steady__csv="a,b\n1,2\n"))
     assert {"sweep", "runs"} <= subjects(findings)
     assert any("same samples as r0.csv" in f.text for f in findings)
     assert any("steady.csv is not named" in f.text for f in findings)
+    root = folder(start_up(), runs__csv="file,time_factor\nr0.csv,3\n")
+    assert "clock" in subjects(check_folder(root), "note")
+    assert "clock" not in subjects(check_folder(root, "time_factor"), "note")
+    assert "clock" in subjects(check_folder(root, "other"), "error")
+    for samples, doubted in ((30, True), (300, False)):
+        t = np.linspace(0, 20, samples)
+        table = {"time_s": t, "shear_rate_1_s": np.cos(2 * t), "stress_Pa": np.cos(2 * t - 0.5)}
+        assert ("sampling" in subjects(check_folder(folder(table)))) is doubted
 
 
 @pytest.mark.parametrize(
@@ -275,20 +273,6 @@ def test_a_missing_sweep_a_copy_and_a_file_left_over_are_told(folder):
 def test_runs_at_several_temperatures_are_told_unless_their_times_are_shifted(folder, index, told):
     found = check_folder(folder(start_up(), start_up(2.0), runs__csv=index))
     assert ("temperature" in subjects(found)) is told
-
-
-def test_the_clock_column_is_told_when_it_is_not_used(folder):
-    root = folder(start_up(), runs__csv="file,time_factor\nr0.csv,3\n")
-    assert "clock" in subjects(check_folder(root), "note")
-    assert "clock" not in subjects(check_folder(root, "time_factor"), "note")
-    assert "clock" in subjects(check_folder(root, "other"), "error")
-
-
-def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
-    for samples, doubted in ((30, True), (300, False)):
-        t = np.linspace(0, 20, samples)
-        table = {"time_s": t, "shear_rate_1_s": np.cos(2 * t), "stress_Pa": np.cos(2 * t - 0.5)}
-        assert ("sampling" in subjects(check_folder(folder(table)))) is doubted
 
 
 def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):

@@ -27,7 +27,7 @@ def folder(tmp_path):
     return write
 
 
-def test_a_constant_rate_is_a_start_up_and_a_varying_one_is_followed(folder):
+def test_a_constant_rate_is_a_start_up_a_varying_one_is_followed_and_the_sweep_is_sorted(folder):
     data = load_dataset(folder(), clock_factor="factor")
     steady, varying = data["a.csv"], data["b.csv"]
     assert steady.clock_factor == 2.0
@@ -37,11 +37,7 @@ def test_a_constant_rate_is_a_start_up_and_a_varying_one_is_followed(folder):
     assert shear_rates(varying.protocol, np.array([1.5])) == pytest.approx([1.5])
     np.testing.assert_array_equal(steady.first_normal_stress_difference, [0.0, 1.0, 2.0])
     assert varying.first_normal_stress_difference is None
-
-
-def test_the_sweep_is_sorted_by_frequency(folder):
     sweep = load_dataset(folder()).linear_sweep
-    assert sweep is not None
     np.testing.assert_array_equal(sweep.angular_frequency, [1.0, 10.0])
     np.testing.assert_array_equal(sweep.storage_modulus, [25.0, 50.0])
 
@@ -58,32 +54,27 @@ def test_units_in_column_names_are_converted(folder):
     np.testing.assert_allclose(run.rate, 1.0)
     np.testing.assert_allclose(run.stress, [0.0, 500.0])
     np.testing.assert_allclose(run.strain, [0.0, 0.1])
-    assert data.linear_sweep is not None
     np.testing.assert_allclose(data.linear_sweep.angular_frequency, 2 * np.pi)
     np.testing.assert_allclose(data.linear_sweep.loss_modulus, 1.0)  # 10 dyn/cm2 = 1 Pa
 
 
-def test_a_column_that_only_begins_like_a_quantity_is_not_taken_for_it(folder):
-    text = "time_s,shear_rate_1_s,stress_Pa,strain_since_first_sample\n0,1,0,7\n1,1,1,8\n"
-    assert load_dataset(folder(a__csv=text))["a.csv"].strain is None
-
-
-def test_the_rate_is_derived_from_strain_and_the_run_says_so(folder):
+def test_a_rate_is_derived_from_strain_said_to_be_and_measured_then_or_where_the_caller_says_so(
+    folder,
+):
     time = np.linspace(0, 6, 400)
     rows = "\n".join(f"{t:.8f},{np.sin(t):.10f},1" for t in time)
     run = load_dataset(folder(a__csv="time_s,strain,stress_Pa\n" + rows))["a.csv"]
     # a cubic over 15 samples of 15 ms: truncation error below 1e-4 at the ends
     np.testing.assert_allclose(run.rate, np.cos(time), atol=1e-4)
     assert "derived from strain" in str(run.metadata["shear_rate_source"])
-
-
-def test_a_rate_is_measured_if_it_was_derived_or_the_caller_says_so(folder):
     rows = "\n".join(f"{t},{0.5 * t},1" for t in range(8))
     made = folder(b__csv="time_s,strain,stress_Pa\n" + rows)
     data = load_dataset(made)
     assert not data["a.csv"].rate_is_measured
     assert data["b.csv"].rate_is_measured
     assert load_dataset(made, rate_is_measured=True)["a.csv"].rate_is_measured
+    text = "time_s,shear_rate_1_s,stress_Pa,strain_since_first_sample\n0,1,0,7\n1,1,1,8\n"
+    assert load_dataset(folder(a__csv=text))["a.csv"].strain is None
 
 
 def test_a_sample_remembers_the_strain_of_earlier_runs(folder):
@@ -174,14 +165,11 @@ def test_every_file_and_every_column_is_told_of(tmp_path):
     assert len([one for one in dc.check_folder(root) if one.severity == "error"]) == len(said)
 
 
-def test_all_lines_of_one_fault_are_named(tmp_path):
+def test_all_lines_of_one_fault_are_named_and_what_is_misspelled_gets_a_guess(tmp_path):
     lines = "".join(f"{i},1,{'x' if i in (3, 5, 9) else 2}\n" for i in range(12))
     root = folder_of(tmp_path, runs="file\na.csv\n", a="time_s,shear_rate_1_s,stress_Pa\n" + lines)
     with pytest.raises(dc.InputError, match=r"line 5 holds x.*\(Lines 7 and 11 too\.\)"):
         dc.load_dataset(root)
-
-
-def test_a_folder_a_file_and_a_run_that_are_misspelled_get_a_guess(tmp_path):
     root = folder_of(tmp_path, runs="file\nfast.csv\nslwo.csv\n", fast=SOUND, slow=SOUND)
     with pytest.raises(dc.InputError, match=r"Did you mean 'slow\.csv'"):
         dc.load_dataset(root)

@@ -1,12 +1,16 @@
-"""Tables beside the runs, and runs at a given stress, from files written by hand."""
+"""What a data set holds beside runs: material functions, sweeps and relaxation spectra."""
 
 import numpy as np
 import pytest
+from independent import Giesekus, Modes
+from independent.sweeps import modulus_of
 from made_exports import write_files
 
-from discover.dataset import load_dataset
+from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
 from discover.dataset.checking.folder import check_folder
+from discover.dataset.checking.linear_theory import sweep_inertia
 from discover.errors import InputError
+from discover.laws.multimode import Fluid
 from discover.study import parse_study
 from discover.study.data import load_study_data
 from discover.study.in_memory import data_in_memory
@@ -39,13 +43,26 @@ def test_a_folder_of_one_table_is_a_data_set_which_is_fitted_of_a_sweep_both_mod
     assert data_in_memory(load_dataset(folder)).fit.names == data.fit.names
 
 
-def test_an_amplitude_sweep_is_sorted_by_strain_and_converted(tmp_path):
+def test_tables_are_sorted_and_converted_and_linear_ones_are_looked_at_where_they_are_linear(
+    tmp_path,
+):
     run = load_dataset(write_files(tmp_path, SWEEPS)).material_functions["amplitude_sweep"]
     storage, loss = run.records
     np.testing.assert_allclose(run.strain, [0.01, 1.0])
     np.testing.assert_allclose(run.angular_frequency, [2.0, 2.0])
     np.testing.assert_allclose(storage.recorded, [50.0, 30.0])
     np.testing.assert_allclose(loss.recorded, [50.0, 40.0])
+    run = load_dataset(write_files(tmp_path, TABLES)).material_functions["flow_curve"]
+    np.testing.assert_allclose(run.rate, [0.1, 1.0, 10.0])
+    np.testing.assert_allclose(run.stress, [3.0, 20.0, 100.0])
+    np.testing.assert_allclose(run.observing("N1").recorded, [0.1, 5.0, 90.0])
+    assert run.protocol.control == "steady"
+    tables = load_dataset(write_files(tmp_path, TABLES)).material_functions
+    creep, relaxation = tables["creep"], tables["relaxation"]
+    assert creep.quantity == "strain"
+    np.testing.assert_allclose(creep.strain / creep.stress, [0.01, 0.02, 0.11])
+    np.testing.assert_allclose(relaxation.stress / relaxation.strain, [90.0, 40.0, 1.0])
+    assert max(creep.strain.max(), relaxation.strain.max()) <= 0.01 * (1.0 + 1e-12)
 
 
 def test_an_amplitude_sweep_judges_and_the_linear_sweep_gives_modes_unless_asked(tmp_path):
@@ -93,24 +110,7 @@ def test_a_strain_in_per_cent_without_its_unit_is_doubted(tmp_path):
     assert not any("strain_percent" in str(doubt) for doubt in doubts)
 
 
-def test_a_flow_curve_is_sorted_by_rate_and_converted(tmp_path):
-    run = load_dataset(write_files(tmp_path, TABLES)).material_functions["flow_curve"]
-    np.testing.assert_allclose(run.rate, [0.1, 1.0, 10.0])
-    np.testing.assert_allclose(run.stress, [3.0, 20.0, 100.0])
-    np.testing.assert_allclose(run.observing("N1").recorded, [0.1, 5.0, 90.0])
-    assert run.protocol.control == "steady"
-
-
-def test_creep_and_relaxation_are_looked_at_where_they_are_linear(tmp_path):
-    tables = load_dataset(write_files(tmp_path, TABLES)).material_functions
-    creep, relaxation = tables["creep"], tables["relaxation"]
-    assert creep.quantity == "strain"
-    np.testing.assert_allclose(creep.strain / creep.stress, [0.01, 0.02, 0.11])
-    np.testing.assert_allclose(relaxation.stress / relaxation.strain, [90.0, 40.0, 1.0])
-    assert max(creep.strain.max(), relaxation.strain.max()) <= 0.01 * (1.0 + 1e-12)
-
-
-def test_a_table_beside_runs_judges_unless_it_is_fitted(tmp_path):
+def test_a_table_beside_runs_or_a_stress_that_is_not_observed_judges_unless_it_is_fitted(tmp_path):
     folder = write_files(tmp_path, {**TABLES, "runs.csv": "file\na.csv\n", "a.csv": RUN})
     judging = load_study_data(study(folder))
     assert judging.fit.names == ("a.csv",)
@@ -118,10 +118,7 @@ def test_a_table_beside_runs_judges_unless_it_is_fitted(tmp_path):
     fitted = load_study_data(study(folder, flow_curve="fit"))
     assert fitted.fit.names == ("a.csv", "flow_curve.csv")
     assert set(fitted.held_out.names) == {"relaxation.csv", "creep.csv"}
-
-
-def test_what_is_recorded_and_not_observed_judges(tmp_path):
-    folder = write_files(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    folder = write_files(tmp_path / "observed", {"flow_curve.csv": TABLES["flow_curve.csv"]})
     data = load_study_data(study(folder, flow_curve="fit", observe=["N1"]))
     assert data.fit.names == ("flow_curve.csv (N1)",)
     assert data.held_out.names == ("flow_curve.csv",)
@@ -150,3 +147,207 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
     assert run.quantity == "strain"
     np.testing.assert_allclose(run.recorded, [0.01, 0.02, 0.11, 0.2])
     assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
+
+
+def sweep_of(modulus, relaxation_time, frequency):
+    truth = RelaxationSpectrum(np.asarray(modulus), np.asarray(relaxation_time), 0.0, 0.0)
+    return LinearSweep(frequency, *truth.moduli(frequency))
+
+
+def test_modes_reproduce_a_broad_sweep_may_be_counted_and_need_two_frequencies():
+    frequency = np.geomspace(1e-3, 1e3, 61)
+    times = np.geomspace(1e-3, 1e3, 7)
+    sweep = sweep_of(1e4 * times**-0.3, times, frequency)
+    spectrum = relaxation_spectrum(sweep)
+    storage, loss = spectrum.moduli(frequency)
+    error = np.concatenate([storage / sweep.storage_modulus, loss / sweep.loss_modulus]) - 1
+    assert spectrum.relative_error == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert spectrum.relative_error < 0.05
+    assert np.all(spectrum.modulus > 0)
+    one = np.ones(1)
+    with pytest.raises(InputError, match="at least 2 frequencies"):
+        relaxation_spectrum(LinearSweep(one, one, one))
+    sweep = made(*MATERIALS["melt"], noise=0.01)
+    assert [len(relaxation_spectrum(sweep, modes=count)) for count in (2, 4)] == [2, 4]
+    with pytest.raises(InputError, match="modes must be from 1"):
+        relaxation_spectrum(sweep, modes=0)
+
+
+def test_the_melt_needs_a_dozen_modes_and_misses_its_sweep_by_under_4_percent(measured_data):
+    sweep = load_dataset(measured_data / "pi95k-startup").linear_sweep
+    spectrum = relaxation_spectrum(sweep)
+    assert 10 <= len(spectrum) <= 16
+    assert spectrum.relative_error < 0.04
+
+
+@pytest.mark.parametrize("inertia", [0.0, 2e-3, -2e-3])
+def test_inertia_left_in_a_sweep_comes_back_with_its_sign(inertia):
+    omega = np.geomspace(0.1, 100.0, 25)
+    x = omega[:, None] * np.array([0.1, 1.0])
+    modulus = np.array([40.0, 100.0])
+    generator = np.random.default_rng(0)
+    storage = (x**2 / (1 + x**2)) @ modulus - inertia * omega**2
+    loss = (x / (1 + x**2)) @ modulus
+    noisy = [v * (1 + 0.01 * generator.standard_normal(25)) for v in (storage, loss)]
+    found = sweep_inertia(LinearSweep(omega, *noisy))
+    assert found.inertia == pytest.approx(inertia, abs=4 * found.deviation)
+    assert (found.evidence > 6.0) == (inertia != 0.0)
+    if inertia != 0.0:
+        assert found.deviation < 0.1 * abs(inertia)
+        assert found.error_after < 0.3 * found.error_before
+
+
+def test_the_inertia_left_in_the_gel_sweep_is_a_small_part_of_the_stated_one(measured_data):
+    sweep = load_dataset(measured_data / "gel-laos").linear_sweep
+    found = sweep_inertia(sweep)
+    # inertia of motor and tool in the file's header, strain and stress constants of its plates
+    stated = (20.5844e-6 + 1.65747e-6) * 9947180 / 5.714
+    assert found.evidence > 6.0
+    assert 0.01 * stated < found.inertia < 0.05 * stated
+
+
+OMEGA = np.geomspace(0.03, 50.0, 17)
+MODULI, TIMES = np.array([20.0, 60.0, 120.0]), np.array([10.0, 1.0, 0.1])
+
+
+@pytest.fixture(scope="module")
+def at_a_strain_of_one():
+    """G′ + iG″ of three Giesekus modes at a strain of 1, which is not small, by scipy."""
+    fluid = Modes(*(Giesekus(0.3, g, t) for g, t in zip(MODULI, TIMES, strict=True)))
+    return np.array([modulus_of(fluid, 1.0, omega, 4) for omega in OMEGA])
+
+
+def noisy(complex_modulus, size, seed):
+    lot = np.random.default_rng([seed, 77])
+    parts = (complex_modulus.real, complex_modulus.imag)
+    return LinearSweep(OMEGA, *(v * (1 + size * lot.standard_normal(len(OMEGA))) for v in parts))
+
+
+def linear_modulus():
+    x = 1j * OMEGA[:, None] * TIMES
+    return (x / (1 + x)) @ MODULI
+
+
+def relative(found, measured):
+    """Return G′ and G″ of modes of 1 Pa over those measured."""
+    x = 1j * OMEGA[:, None] * found.relaxation_time
+    modes = x / (1 + x)
+    return np.concatenate([modes.real, modes.imag]) / measured[:, None]
+
+
+def off_by(found):
+    """Return how far moduli are from those of the linear sweep, in standard deviations."""
+    exact = linear_modulus()
+    design = relative(found, np.concatenate([exact.real, exact.imag]))
+    true = np.linalg.lstsq(design, np.ones(len(design)))[0]
+    return (found.modulus - true) / np.sqrt(np.diag(found.modulus_covariance))
+
+
+def independent(sweep, found):
+    """Return the variance of moduli with each frequency as an independent one."""
+    design = relative(found, np.concatenate([sweep.storage_modulus, sweep.loss_modulus]))
+    left = np.sum((design @ found.modulus - 1.0) ** 2) / (len(design) - len(found))
+    return left * np.diag(np.linalg.inv(design.T @ design))
+
+
+def test_intervals_hold_though_the_strain_was_not_small_and_noise_widens_nothing(
+    at_a_strain_of_one,
+):
+    for seed in range(3):
+        sweep = noisy(at_a_strain_of_one, 0.01, seed)
+        found = relaxation_spectrum(sweep)
+        assert np.all(np.abs(off_by(found)) < 2.0)
+        # half of them are off by more than two if each frequency counts
+        alone = independent(sweep, found)
+        assert np.all(np.diag(found.modulus_covariance) > 4.0 * alone)
+    wider = []
+    for seed in range(20):
+        sweep = noisy(linear_modulus(), 0.03, seed)
+        found = relaxation_spectrum(sweep)
+        wider.append(found.modulus_covariance[0, 0] / independent(sweep, found)[0])
+    # one in twenty may look like a pattern
+    assert np.count_nonzero(np.array(wider) > 1.001) <= 3
+
+
+def test_modes_too_few_leave_more_than_the_best_number_would():
+    frequency = np.geomspace(1e-3, 1e3, 61)
+    times = 1.3 * np.geomspace(1e-3, 1e3, 41) ** 0.97
+    found = relaxation_spectrum(sweep_of(1e4 * times**-0.3, times, frequency), modes=4)
+    assert len(found) == 4
+    assert found.best_error < 0.1 * found.relative_error
+
+
+def made(modulus, time, solvent=0.0, elastic=0.0, noise=0.0, seed=0, inertia=0.0):
+    """Sweep of modes, a solvent and an elastic constant, written out here."""
+    omega, lot = np.geomspace(0.1, 100.0, 31), np.random.default_rng([seed, 62])
+    x = 1j * omega[:, None] * np.asarray(time)
+    moduli = (x / (1 + x)) @ np.asarray(modulus) + elastic + 1j * omega * solvent
+    moduli = moduli - inertia * omega**2
+    parts = (moduli.real, moduli.imag)
+    return LinearSweep(omega, *(v * (1 + noise * lot.standard_normal(31)) for v in parts))
+
+
+MATERIALS = {
+    "Oldroyd-B": ([50.0], [0.7], 0.4, 0.0),
+    "Boger": ([2.0], [1.5], 5.0, 0.0),
+    "Kelvin-Voigt": ([], [], 3.0, 40.0),
+    "Zener": ([300.0], [0.2], 0.0, 80.0),
+    "two modes": ([1200.0, 6000.0], [1.5, 0.08], 25.0, 0.0),
+    "melt": ([20.0, 60.0, 120.0], [10.0, 1.0, 0.1], 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("name", MATERIALS)
+def test_modes_solvent_and_elastic_constant_come_back_to_the_noise(name, noise):
+    modulus, time, solvent, elastic = MATERIALS[name]
+    sweep = made(*MATERIALS[name], noise=noise)
+    found = relaxation_spectrum(sweep)
+    # 62 values scatter by a tenth; a constant is a mode that errs by less than sweeps repeat to
+    assert found.relative_error < max(1.3 * noise, 3e-4)
+    # of six constants of 1 % noise the worst is told to some 3 %
+    near = {"rtol": 6.0 * noise + 1e-3}
+    n = len(modulus)
+    assert len(found) == n + (elastic > 0.0)
+    order = np.argsort(time)
+    np.testing.assert_allclose(found.modulus[:n], np.asarray(modulus)[order], **near)
+    np.testing.assert_allclose(found.relaxation_time[:n], np.asarray(time)[order], **near)
+    np.testing.assert_allclose(
+        [found.solvent_viscosity, found.elastic_modulus], [solvent, elastic], **near
+    )
+    assert bool(found.solid) == (elastic > 0.0)
+    inertia = sweep_inertia(sweep)
+    assert inertia.error_before < 0.02 or inertia.evidence < 6.0
+
+
+@pytest.mark.parametrize("name", ["Oldroyd-B", "Zener"])
+def test_inertia_is_still_found_beside_a_solvent_or_an_elastic_constant(name):
+    sweep = made(*MATERIALS[name], noise=0.01, inertia=2e-3)
+    found = sweep_inertia(sweep)
+    assert found.evidence > 6.0
+    # a mode faster than the sweep rises with the square of the frequency too, so it is told roughly
+    assert found.inertia == pytest.approx(2e-3, rel=0.3)
+
+
+def test_a_declared_solvent_is_not_found_again_and_a_fluid_of_a_solid_says_so():
+    sweep = made(*MATERIALS["two modes"], noise=0.01)
+    held = relaxation_spectrum(sweep, solvent_viscosity=25.0)
+    assert held.solvent_viscosity == 25.0
+    assert len(held) == 2
+    none = relaxation_spectrum(sweep, solvent_viscosity=0.0)
+    assert none.solvent_viscosity == 0.0
+    assert none.relative_error < 0.02  # faster modes stand for it
+    assert none.relaxation_time[0] < 0.01
+    sweep = made(*MATERIALS["Kelvin-Voigt"], noise=0.01)
+    with pytest.warns(UserWarning, match="solid down to 0.1 rad/s"):
+        fluid = Fluid.from_sweep(sweep)
+    x = 1j * sweep.angular_frequency[:, None] * np.asarray(fluid.relaxation_time)
+    moduli = (x / (1 + x)) @ np.asarray(fluid.modulus)
+    loss = moduli.imag + float(fluid.solvent_viscosity) * sweep.angular_frequency
+    assert np.max(np.abs(moduli.real / sweep.storage_modulus - 1.0)) < 0.04
+    assert np.max(np.abs(loss / sweep.loss_modulus - 1.0)) < 0.04
+
+
+def test_one_in_a_hundred_fluids_at_most_is_taken_for_a_solid():
+    fluids = (made([300.0, 20.0], [0.2, 3.0], noise=0.02, seed=seed) for seed in range(40))
+    assert sum(bool(relaxation_spectrum(fluid).solid) for fluid in fluids) <= 1

@@ -40,16 +40,13 @@ def test_a_flow_is_called_by_its_name(rate, before, flow):
     assert (line["frequency_rad_s"] is None) is (flow != "oscillation")
 
 
-def test_amplitude_and_frequency_are_read_off_a_noisy_rate():
+def test_amplitude_and_frequency_are_read_off_a_noisy_rate_and_one_sample_has_a_line():
     noise = 0.1 * np.random.default_rng(1).normal(size=201)
     line = run_line(run(6.0 * np.cos(3.0 * TIME + 1.0) + noise))
     assert line["frequency_rad_s"] == pytest.approx(3.0, rel=0.002)
     assert line["strain_amplitude"] == pytest.approx(2.0, rel=0.02)
     assert line["largest_rate_1_s"] == pytest.approx(6.0, rel=0.1)
     assert (line["samples"], line["duration_s"], line["largest_stress_Pa"]) == (201, 10.0, 3.0)
-
-
-def test_a_single_sample_has_a_line():
     one = np.ones(1)
     line = run_line(Run("a", 0.0 * one, measured_rate([0.0], [1.0]), one, one))
     assert (line["flow"], line["samples"]) == ("start-up", 1)
@@ -71,7 +68,7 @@ def test_a_data_set_shows_its_runs_with_units_and_escapes_their_names():
     assert "no linear sweep" in Dataset("x", ())._repr_html_()
 
 
-def test_findings_show_their_whole_sentences_and_stay_a_tuple():
+def test_findings_show_whole_sentences_and_a_window_cuts_samples_and_keeps_the_flow():
     text = "The column <x> in a.csv " + "is not used, " * 20 + "at all."
     findings = Findings([Finding("warning", "columns", "a.csv", text)])
     shown = findings._repr_html_()
@@ -80,6 +77,12 @@ def test_findings_show_their_whole_sentences_and_stay_a_tuple():
     assert findings == (findings[0],)
     assert Findings() == ()
     assert Findings()._repr_html_() == "<p>Nothing wrong was found.</p>"
+    time = np.array([0.0, 1.0, 2.0])
+    run = Run("a.csv", time, start_up(1.0), np.ones(3), time, 2.0 * time)
+    cut = run.window(run.time > 0.5)
+    assert len(cut) == 2
+    assert cut.protocol is run.protocol
+    np.testing.assert_array_equal(cut.first_normal_stress_difference, [2.0, 4.0])
 
 
 def titled(**metadata):
@@ -109,13 +112,3 @@ def test_titles_name_what_the_table_names_or_the_data_where_it_names_none_or_man
 ):
     runs = [titled(**row) for row in rows]
     assert material_and_temperature(runs, otherwise=otherwise) == words
-
-
-def test_a_window_cuts_samples_and_keeps_the_flow():
-    time = np.array([0.0, 1.0, 2.0])
-    run = Run("a.csv", time, start_up(1.0), np.ones(3), time, 2.0 * time)
-    cut = run.window(run.time > 0.5)
-    assert len(cut) == 2
-    assert cut.protocol is run.protocol
-    assert cut.first_normal_stress_difference is not None
-    np.testing.assert_array_equal(cut.first_normal_stress_difference, [2.0, 4.0])

@@ -28,6 +28,15 @@ WRITTEN = {
     "%": 0.01, "rad/s": 1.0, "rpm": math.pi / 30, "deg": math.pi / 180, "°": math.pi / 180,
     "-": 1.0, "": 1.0, "1": 1.0,
 }  # fmt: skip
+IN_EVERY_WRITING = {
+    "1/s|s⁻¹|s^-1|s-1|s^{-1}|/s|1/sec|１／ｓ|1/с|с⁻¹": 1.0,
+    "mPa·s|mPa s|mPas|mPa.s|mPa-s|mPa・s|cP|мПа·с|ｍＰａ・ｓ": 1e-3,
+    "dyn/cm²|dyn/cm^2|Dyne/cm2|dynes/cm^2": 0.1,
+    "min|Min|分|мин|분": 60.0,
+    "°|deg|度|Grad": np.pi / 180.0,
+    "㎪|kPa|ｋＰａ|кПа": 1e3,
+}
+WRITTEN |= {text: factor for texts, factor in IN_EVERY_WRITING.items() for text in texts.split("|")}
 NO_UNITS = ("Pa_2", "10Pa", "2", "1", "1e3Pa", "s_2", "Pa_10", "Pa22", "Pa__2", "pi", "e", "Pas",
             "mkPa", "Pa_", "__", "raw", "9**9")  # fmt: skip
 
@@ -38,7 +47,7 @@ NEVER_WORKED_OUT = (
 
 
 @pytest.mark.parametrize(("read", "known"), [(read_heading, HEADINGS), (read_unit, WRITTEN)])
-def test_units_of_headings_and_of_exports_have_their_factors(read, known):
+def test_units_of_headings_and_of_exports_in_every_writing_have_their_factors(read, known):
     for text, factor in known.items():
         unit = read(text)
         assert unit is not None, text
@@ -81,7 +90,7 @@ def test_a_column_that_is_not_read_for_its_heading_is_left_alone_and_said(tmp_pa
     assert words in " ".join(map(str, check_folder(tmp_path)))
 
 
-def test_every_conversion_is_said(tmp_path):
+def test_every_conversion_is_said_and_si_units_are_none(tmp_path):
     sweep = "omega_Hz,Gp_kPa,Gpp_Pa\n0.1,1,5\n1,10,10\n10,15,5\n"
     write(tmp_path, f"time_ms,shear_rate_1_min,stress_kPa\n{ROWS}", sweep)
     said = " ".join(str(f) for f in check_folder(tmp_path) if f.subject == "units")
@@ -89,9 +98,6 @@ def test_every_conversion_is_said(tmp_path):
                   "times 1000 to Pa", "shear_rate_1_min", "omega_Hz", "Gp_kPa"):  # fmt: skip
         assert words in said
     assert "Gpp" not in said
-
-
-def test_si_units_are_no_conversion(tmp_path):
     write(tmp_path, f"time_s,shear_rate_1_s,stress_Pa\n{ROWS}")
     assert not [f for f in check_folder(tmp_path) if f.subject == "units"]
 
@@ -202,13 +208,10 @@ def test_the_stress_of_a_sweep_tells_whether_its_strain_is_in_per_cent(tmp_path,
         read(tmp_path, sweep("Strain", "Shear stress (Pa)", lambda *v: 7.0 * stress(*v)))
 
 
-def test_the_rate_of_a_run_tells_the_unit_of_its_strain(tmp_path):
+def test_the_rate_of_a_run_and_a_complex_viscosity_tell_units_of_strain_and_frequency(tmp_path):
     for strain in (200.0 * TIME, 2.0 * TIME):
         made = read(tmp_path, start_up(Strain=strain))
         np.testing.assert_allclose(columns(made.files["a.csv"])["strain"], 2.0 * TIME)
-
-
-def test_complex_viscosity_tells_hertz_from_radians(tmp_path):
     frequency = np.geomspace(0.1, 10.0, 8)
     storage, loss = 100.0 * frequency**0.7, 80.0 * frequency**0.6
     size = np.hypot(storage, loss) / (2.0 * np.pi * frequency)
@@ -226,19 +229,15 @@ def test_a_viscosity_without_a_unit_is_asked_for_only_where_it_stands_for_the_st
     np.testing.assert_allclose(got["stress_Pa"], STRESS)
 
 
-def test_a_capital_T_without_a_unit_is_a_temperature_and_no_time(tmp_path):
+def test_no_unit_is_asked_of_a_temperature_a_table_of_our_own_or_a_strain_that_is_not_used(
+    tmp_path,
+):
     rate = np.geomspace(1.0, 100.0, 6)
     text = table(T=np.full(6, 25.0), **{"Shear rate": rate, "Stress": STRESS})
     assert "flow_curve.csv" in read(tmp_path, text).files
     assert "a.csv" in read(tmp_path, start_up("t")).files
-
-
-def test_a_table_of_this_projects_own_needs_no_unit_of_strain(tmp_path):
     text = table(time_s=TIME, strain=2.0 * TIME, stress_Pa=STRESS)
     np.testing.assert_allclose(columns(read(tmp_path, text).files["a.csv"])["strain"], 2.0 * TIME)
-
-
-def test_a_sweep_of_frequency_does_not_ask_for_a_strain_that_it_does_not_use(tmp_path):
     omega = np.geomspace(0.1, 10.0, 8)
     known = {"Angular frequency (rad/s)": omega, "G' (Pa)": omega, "G'' (Pa)": omega}
     text = table(Strain=np.full(8, 0.5), **known)
@@ -257,10 +256,14 @@ def test_a_unit_that_changes_nothing_is_named(tmp_path):
         assert columns(made.files["amplitude_sweep.csv"])["strain"][-1] == pytest.approx(10.0)
 
 
-def test_units_in_lines_above_the_numbers_are_used_and_the_time_of_day_is_none(tmp_path):
+def test_units_in_lines_above_are_used_a_time_of_day_is_none_and_a_clock_is_the_time(tmp_path):
     above = "Time: 12:15:24\nDate: 2024-01-05\nShear Stress Unit: dyn/cm^2\n\n"
     made = read(tmp_path, above + start_up("Elapsed Time", "S. Rate", "S. Stress"))
     np.testing.assert_allclose(columns(made.files["a.csv"])["stress_Pa"], 0.1 * STRESS)
+    stamps = [f"00:00:{t:02d}" for t in range(2, 14, 2)]
+    rows = "".join(f"{t},10.0,{s}\n" for t, s in zip(stamps, STRESS, strict=True))
+    made = read(tmp_path, "Elapsed Time,Shear Rate,Shear Stress\n(hh:mm:ss),(1/s),(Pa)\n" + rows)
+    np.testing.assert_allclose(columns(made.files["a.csv"])["time_s"], np.arange(2.0, 14.0, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -281,13 +284,6 @@ def test_clock_times_become_seconds(cells, wanted):
     np.testing.assert_allclose(seconds(cells), wanted, atol=1e-6)  # a stamp has digits of 1e-7 s
 
 
-def test_a_run_with_a_clock_is_a_run(tmp_path):
-    stamps = [f"00:00:{t:02d}" for t in range(2, 14, 2)]
-    rows = "".join(f"{t},10.0,{s}\n" for t, s in zip(stamps, STRESS, strict=True))
-    made = read(tmp_path, "Elapsed Time,Shear Rate,Shear Stress\n(hh:mm:ss),(1/s),(Pa)\n" + rows)
-    np.testing.assert_allclose(columns(made.files["a.csv"])["time_s"], np.arange(2.0, 14.0, 2.0))
-
-
 @pytest.mark.parametrize(
     ("heading", "name", "unit"),
     [
@@ -299,24 +295,6 @@ def test_a_run_with_a_clock_is_a_run(tmp_path):
 )  # fmt: skip
 def test_a_unit_is_taken_off_a_heading(heading, name, unit):
     assert name_and_unit(heading, "") == (name, unit)
-
-
-@pytest.mark.parametrize(
-    ("texts", "factor"),
-    [
-        ("1/s|s⁻¹|s^-1|s-1|s^{-1}|/s|1/sec|１／ｓ|1/с|с⁻¹", 1.0),
-        ("mPa·s|mPa s|mPas|mPa.s|mPa-s|mPa・s|cP|мПа·с|ｍＰａ・ｓ", 1e-3),
-        ("dyn/cm²|dyn/cm^2|Dyne/cm2|dynes/cm^2", 0.1),
-        ("min|Min|分|мин|분", 60.0),
-        ("°|deg|度|Grad", np.pi / 180.0),
-        ("㎪|kPa|ｋＰａ|кПа", 1e3),
-    ],
-)
-def test_units_are_read_in_every_writing(texts, factor):
-    for text in texts.split("|"):
-        unit = read_unit(text)
-        assert unit is not None, text
-        assert unit.factor == pytest.approx(factor, rel=1e-12), text
 
 
 @pytest.mark.parametrize(

@@ -135,10 +135,12 @@ def test_words_and_numbers_that_exclude_each_other_are_one_message(tmp_path, tit
 
 
 @pytest.mark.parametrize("title", ["Relaxation time: 2 s", "Sample: creep-resistant blend",
-                                   "Relaxation, creep and start-up of a melt"])  # fmt: skip
-def test_words_that_name_no_test_or_several_leave_the_numbers_to_speak(tmp_path, title):
+                                   "Relaxation, creep and start-up of a melt",
+                                   "Laboratory of extensional rheometry"])  # fmt: skip
+def test_words_that_name_no_test_or_several_leave_numbers_and_columns_to_speak(tmp_path, title):
     out, _ = export(tmp_path, AT_A_RATE, title)
-    assert load_dataset(out)[0].protocol.control == "rate"
+    (test,) = load_dataset(out)
+    assert (test.protocol.control, test.flow) == ("rate", "shear")
 
 
 WAVE = np.linspace(0.0, 20.0, 300)
@@ -169,11 +171,6 @@ def test_what_stands_in_a_unit_of_time_is_the_time_and_without_one_nothing_is_st
     assert "Export it with its time" in result.stderr
 
 
-def test_rates_and_stresses_without_a_time_are_still_a_flow_curve(tmp_path):
-    out, _ = export(tmp_path, {"Shear rate [1/s]": UP, "Shear stress [Pa]": 12 * UP**0.4})
-    np.testing.assert_allclose(table(out / "flow_curve.csv")["shear_rate_1_s"], UP)
-
-
 TENSIONS = {
     "word": (("# Test = Extensional rheometry",), "Strain rate [1/s]", "Stress [Pa]"),
     "rate": ((), "Extension rate [1/s]", "Stress [Pa]"),
@@ -188,11 +185,6 @@ def test_tension_is_no_shear_whichever_of_its_words_says_so(tmp_path, case):
     (test,) = load_dataset(out)
     assert test.flow == "uniaxial"
     np.testing.assert_allclose(test.rate, 0.3)
-
-
-def test_shear_is_no_tension_where_its_columns_say_shear(tmp_path):
-    out, _ = export(tmp_path, AT_A_RATE, "Laboratory of extensional rheometry")
-    assert load_dataset(out)[0].flow == "shear"
 
 
 @pytest.mark.parametrize("shift", [0.0, np.pi / 2, 2.0])

@@ -41,13 +41,8 @@ def test_the_wheel_holds_both_packages_their_templates_and_nothing_else(built):
 def test_the_sdist_holds_what_a_packager_builds_and_tests_with(built):
     names = {"/".join(name.split("/")[1:]) for name in built[1].getnames()}
     wanted = {
-        "pyproject.toml",
-        "LICENSE",
-        "README.md",
-        "CHANGELOG.md",
-        "CITATION.cff",
-        "mkdocs.yml",
-    }
+        "pyproject.toml", "LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "mkdocs.yml",
+    }  # fmt: skip
     assert wanted <= names
     assert {"tests/docs/test_distribution.py", "docs/tutorial.md"} <= names
     assert not [name for name in names if name.startswith((".venv", "results", "site/", "data/"))]

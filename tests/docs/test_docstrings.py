@@ -145,12 +145,9 @@ def dead_links(pages):
     return dead
 
 
-def test_every_link_of_the_site_leads_somewhere(site):
+def test_every_link_of_the_site_leads_somewhere_and_one_to_nowhere_is_seen(site, tmp_path):
     assert len(site) > 30
     assert not dead_links(site)
-
-
-def test_a_link_to_nowhere_is_seen(tmp_path):
     # control of the test above
     path = tmp_path / "a.html"
     path.write_text('<a href="b.html">b</a> <a href="#there">c</a> <p id="here"></p>')
@@ -162,7 +159,7 @@ def test_the_site_loads_nothing_from_a_network(site):
         assert not [source for source in page.loaded if "//" in source], path.name
 
 
-def test_every_public_name_is_in_the_reference(site):
+def test_every_public_name_and_what_users_hold_of_it_is_in_the_reference(site):
     places = set().union(*(page.places for page in site.values()))
     tables = {
         "laws": "discover.laws.registry.laws_table",
@@ -172,9 +169,6 @@ def test_every_public_name_is_in_the_reference(site):
         assert tables.get(name, f"discover.{name}") in places, name
     for name in tensor_library.__all__:
         assert f"tensor_library.{name}" in places, name
-
-
-def test_methods_and_results_that_users_hold_are_in_the_reference(site):
     places = set().union(*(page.places for page in site.values()))
     for learner in ("TensorSINDy", "TBNNUDE"):
         for method in ("fit", "predict", "score", "save", "equation_"):

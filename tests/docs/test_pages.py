@@ -135,7 +135,7 @@ def test_the_batch_script_for_a_cluster_is_python():
         ast.parse(text)
 
 
-def test_the_readme_shows_one_picture_that_follows_light_and_dark():
+def test_the_readme_fits_two_screens_with_one_picture_that_follows_light_and_dark():
     (name,) = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (ROOT / "README.md").read_text("utf-8"))
     picture = (ROOT / name).read_text("utf-8")
     assert "prefers-color-scheme: dark" in picture
@@ -144,9 +144,6 @@ def test_the_readme_shows_one_picture_that_follows_light_and_dark():
     for text in ("σ₁₂", "N₁", "N₂", "truth", "sparse regression", "neural network"):
         assert text in picture
     assert len(picture) < 60_000
-
-
-def test_the_readme_fits_two_screens():
     assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 100
 
 
@@ -158,17 +155,11 @@ def script(name):
     return made
 
 
-def test_the_page_of_all_keys_is_that_of_the_schema():
+def test_pages_of_keys_and_effects_are_those_of_schema_and_dictionary_and_say_what_they_mean():
     made = script("study_keys")
     assert made.PAGE.read_text("utf-8") == made.study_page(), "run: python docs/study_keys.py"
-
-
-def test_the_page_of_effects_is_what_the_dictionary_writes():
     made = script("effects_page")
     assert made.PAGE.read_text("utf-8") == made.reference_page(), "run: docs/effects_page.py"
-
-
-def test_every_key_of_a_study_file_says_what_it_means():
     schema = Study.model_json_schema()
     sections = [schema, *(part for part in schema["$defs"].values() if "properties" in part)]
     assert len(sections) > 5

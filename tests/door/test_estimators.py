@@ -70,22 +70,19 @@ def eqx_array(leaf):
     return isinstance(leaf, jax.Array)
 
 
-def test_a_base_is_modulus_time_and_law_at_once(sindy):
-    (term,) = sindy.terms_
+def test_a_base_is_modulus_time_and_law_at_once_and_the_covariance_says_an_interval(sindy):
+    (term,), ((variance,),) = sindy.terms_, sindy.covariance_
     assert term.term == "sigma.sigma"
     assert term.coefficient == pytest.approx(MOBILITY, abs=0.03)  # planted by scipy
+    half = 1.96 * np.sqrt(variance)
+    np.testing.assert_allclose(term.ci95, [term.coefficient - half, term.coefficient + half], 1e-4)
 
 
 @pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize("learner", [dc.TensorSINDy, dc.TBNNUDE])
-def test_a_base_is_a_fluid(data, learner):
+def test_a_base_is_a_fluid_and_a_bare_run_is_refused_with_what_to_write(data, learner):
     with pytest.raises(dc.InputError, match=r"must be a Fluid.*Fluid\(law"):
         learner().set_params(base=dc.make_law("ucm")).fit(data)
-
-
-@pytest.mark.usefixtures("as_users_run_it")
-@pytest.mark.parametrize("learner", [dc.TensorSINDy, dc.TBNNUDE])
-def test_a_bare_run_is_refused_with_what_to_write(data, learner):
     with pytest.raises(dc.InputError, match=r"fit\(\[run\]\)"):
         learner().fit(data[0])
     for wrong in (None, "melt", 3.0):
@@ -93,7 +90,9 @@ def test_a_bare_run_is_refused_with_what_to_write(data, learner):
             learner().fit(wrong)
 
 
-def test_an_equation_has_the_modes_and_comes_after_the_fit(sindy, base):
+def test_an_equation_comes_after_the_fit_and_the_score_is_one_less_the_relative_error(
+    sindy, base, data
+):
     equation = sindy.equation_
     assert equation.modulus == tuple(map(float, base.modulus))
     assert r"\sigma" in equation.latex()
@@ -101,9 +100,6 @@ def test_an_equation_has_the_modes_and_comes_after_the_fit(sindy, base):
         dc.TensorSINDy().equation_  # noqa: B018
     with pytest.raises(NotFittedError):
         dc.TensorSINDy().save("nowhere")
-
-
-def test_the_score_is_one_less_the_relative_error(sindy, data):
     run = data["fast.csv"]
     missed = sindy.predict([run]) - run.stress
     error = np.linalg.norm(missed) / np.linalg.norm(run.stress)
@@ -130,17 +126,20 @@ def test_an_estimator_is_the_same_after_every_way(which, request, data, tmp_path
     assert len(repr(fitted)) < 1000
 
 
-def test_the_covariance_of_a_law_says_its_interval(sindy):
-    (term,), ((variance,),) = sindy.terms_, sindy.covariance_
-    half = 1.96 * np.sqrt(variance)
-    np.testing.assert_allclose(term.ci95, [term.coefficient - half, term.coefficient + half], 1e-4)
-
-
-def test_a_file_holds_plain_json(sindy, network, tmp_path):
+def test_a_file_holds_plain_json_and_what_it_cannot_hold_is_said_and_leaves_the_old(
+    sindy, network, tmp_path
+):
     for fitted in (sindy, network):
         content = json.loads(gzip.decompress(fitted.save(tmp_path / "law.discover").read_bytes()))
         assert content["version"] == 3
         assert content["fitted"]["provenance_"]["fields"]["data"] == "melt"
+    path = sindy.save(tmp_path / "law.discover")
+    before = path.read_bytes()
+    other = copy.copy(sindy).set_params(optimizer=object())
+    with pytest.raises(dc.InputError, match="'optimizer' is a object"):
+        other.save(path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["law.discover"]
 
 
 @pytest.mark.parametrize(
@@ -162,11 +161,21 @@ def test_a_file_that_is_no_estimator_is_refused_with_a_reason(sindy, tmp_path, c
         dc.load(path)
 
 
-def test_files_of_other_kinds_are_refused(sindy, tmp_path):
-    with pytest.raises(dc.InputError, match="There is no file"):
-        dc.load(tmp_path / "gone.discover")
-    with pytest.raises(dc.InputError, match="is a folder"):
-        dc.load(tmp_path)
+def test_files_of_other_kinds_folders_and_pipes_are_refused(sindy, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path, said in (
+        (tmp_path / "gone.discover", "There is no file"), ("/dev/zero", "pipe or device"),
+        (tmp_path, r"is a folder\. Give the file that estimator\.save"),
+        (tmp_path / "pipe", "pipe or device"),
+    ):  # fmt: skip
+        with pytest.raises(dc.InputError, match=said):
+            dc.load(path)
+    for path in (tmp_path, ".", ""):
+        with pytest.raises(dc.InputError, match=r"is a folder\. Name a file"):
+            sindy.save(path)
+    with pytest.raises(dc.InputError, match=r"There is no folder .*absent"):
+        sindy.save(tmp_path / "absent" / "law.discover")
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
     whole = sindy.save(tmp_path / "law.discover").read_bytes()
     flipped = bytearray(whole)
     flipped[200] ^= 0xFF
@@ -180,16 +189,6 @@ def test_files_of_other_kinds_are_refused(sindy, tmp_path):
         file.writestr("estimator.json", "{}")
     with pytest.raises(dc.InputError, match=r"an earlier version in the form 1 or 2.*fit again"):
         dc.load(tmp_path / "before")
-
-
-def test_what_a_file_cannot_hold_is_said_and_the_old_file_stays(sindy, tmp_path):
-    path = sindy.save(tmp_path / "law.discover")
-    before = path.read_bytes()
-    other = copy.copy(sindy).set_params(optimizer=object())
-    with pytest.raises(dc.InputError, match="'optimizer' is a object"):
-        other.save(path)
-    assert path.read_bytes() == before
-    assert [file.name for file in tmp_path.iterdir()] == ["law.discover"]
 
 
 FRESH = """
@@ -263,11 +262,3 @@ def test_a_file_that_would_fill_the_memory_or_run_something_is_refused(content, 
         dc.load(path)
     # kilobytes: no more than the limit of 2^28 bytes is unpacked
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
-
-
-def test_a_pipe_or_a_device_is_no_file(tmp_path):
-    pipe = tmp_path / "law.discover"
-    os.mkfifo(pipe)
-    for path in (pipe, "/dev/zero", tmp_path):
-        with pytest.raises(dc.InputError, match=r"pipe or device|folder"):
-            dc.load(path)

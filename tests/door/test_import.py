@@ -20,7 +20,6 @@ HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "
 
 
 def python(code, *arguments, **environment):
-    """What a fresh process prints, and what it writes to standard error."""
     left = ("COMPILATION_CACHE", "TF_CPP", "JAX_PLATFORM")
     kept = {k: v for k, v in os.environ.items() if not any(name in k for name in left)}
     command = [sys.executable, "-c", code, *arguments]
@@ -66,17 +65,12 @@ def test_importing_loads_nothing_heavy_and_takes_less_time_than_importing_numpy(
     assert ours < max(theirs, 0.3)
 
 
-def test_what_is_used_first_loads_what_it_needs_keeps_programs_and_lets_no_error_call_back(
-    first_use,
-):
+def test_what_is_used_first_loads_what_it_needs_and_the_door_lists_public_names_alone(first_use):
     # the negative control of the test above
     (_, _, loaded, on_error, _), folder = first_use
     assert "jax" in loaded
     assert on_error == "nan"
     assert (folder / "discover" / "compiled").is_dir()
-
-
-def test_the_door_lists_public_names_alone_also_where_submodules_are_loaded(first_use):
     assert first_use[0][-1].split() == sorted([*dc.__all__, "__version__"])
 
 
@@ -193,18 +187,18 @@ def two_threads(monkeypatch):
 
 @TWO
 @pytest.mark.usefixtures("two_threads")
-def test_a_product_takes_one_thread_inside_and_what_it_took_before_afterwards():
+def test_a_product_and_a_fit_take_one_thread_or_what_the_user_chose_and_give_it_back(monkeypatch):
     assert threads() == {2}
     assert in_one_thread(threads)() == {1}
     assert threads() == {2}
     with pytest.raises(ZeroDivisionError):
         in_one_thread(lambda: 1 / 0)()
     assert threads() == {2}
-
-
-@TWO
-@pytest.mark.usefixtures("two_threads")
-def test_a_number_that_the_user_chose_stays(monkeypatch):
+    seen = []
+    monkeypatch.setattr(dc.TensorSINDy, "_learn", lambda self, runs, known: seen.append(threads()))
+    run = dc.synthetic_dataset("ucm", noise=0.01)[0]
+    dc.TensorSINDy(base=dc.Fluid(dc.make_law("ucm"), 1.0, 1.0)).fit([run])
+    assert seen == [{1}]
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     assert in_one_thread(threads)() == {2}
     use_one_thread_from_the_start()
@@ -212,16 +206,6 @@ def test_a_number_that_the_user_chose_stays(monkeypatch):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS")
     use_one_thread_from_the_start()
     assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
-
-
-@TWO
-@pytest.mark.usefixtures("two_threads")
-def test_a_fit_runs_in_one_thread(monkeypatch):
-    seen = []
-    monkeypatch.setattr(dc.TensorSINDy, "_learn", lambda self, runs, known: seen.append(threads()))
-    run = dc.synthetic_dataset("ucm", noise=0.01)[0]
-    dc.TensorSINDy(base=dc.Fluid(dc.make_law("ucm"), 1.0, 1.0)).fit([run])
-    assert seen == [{1}]
 
 
 def test_simulate_is_a_function_and_a_package():

@@ -17,7 +17,7 @@ def data(tmp_path_factory):
     return dc.load_dataset(write_folder(tmp_path_factory.mktemp("door") / "melt"))
 
 
-def test_a_run_is_chosen_by_number_or_name_and_several_are_a_data_set(data):
+def test_a_run_is_chosen_by_number_or_name_several_are_a_data_set_and_none_an_error(data):
     assert len(data) == 3
     assert data[0] is data["slow.csv"] is data[np.int64(-3)]
     assert [run.name for run in data] == list(RATES)
@@ -27,9 +27,6 @@ def test_a_run_is_chosen_by_number_or_name_and_several_are_a_data_set(data):
         assert chosen.names == ("medium.csv", "fast.csv")
         assert chosen.linear_sweep is data.linear_sweep
     assert len(data[[]]) == 0
-
-
-def test_what_chooses_no_run_is_an_error(data):
     with pytest.raises(IndexError, match="3 runs; there is no number 3"):
         data[3]
     with pytest.raises(dc.InputError, match=r"no run 'gone\.csv'"):
@@ -39,14 +36,11 @@ def test_what_chooses_no_run_is_an_error(data):
             data[wrong]
 
 
-def test_scikit_learn_divides_a_data_set(data):
+def test_scikit_learn_divides_a_data_set_and_a_split_does_by_name_and_keeps_the_sweep(data):
     (same,) = indexable(data)
     assert same is data
     folds = [data[test].names for _, test in KFold(3).split(data)]
     assert folds == [(name,) for name in RATES]
-
-
-def test_a_split_divides_by_name_and_keeps_the_sweep(data):
     train, test = data.split(held_out=["fast.csv"])
     assert train.names == ("slow.csv", "medium.csv")
     assert test.names == ("fast.csv",)
@@ -82,7 +76,7 @@ def test_representations_are_short_and_tables_long(data):
     assert list(data.linear_sweep.to_dataframe()) == ["omega_rad_s", "Gp_Pa", "Gpp_Pa"]
 
 
-def test_modes_come_from_the_sweep(data):
+def test_modes_come_from_the_sweep_and_synthetic_data_know_their_linear_response(data):
     fluid = dc.Fluid.from_sweep(data.linear_sweep)
     assert fluid.n_modes == 1
     np.testing.assert_allclose(fluid.modulus, [MODULUS], rtol=1e-6)
@@ -91,30 +85,19 @@ def test_modes_come_from_the_sweep(data):
     assert dc.Fluid.from_sweep(data.linear_sweep, law, modes=2).law is law
     with pytest.raises(dc.InputError, match=r"no lve\.csv"):
         dc.Fluid.from_sweep(None)
-
-
-def test_synthetic_data_know_their_linear_response():
     data = dc.synthetic_dataset("fene_p", {"L2": 10.0}, n_samples=11)
-    assert data.linear_sweep is not None
     omega = data.linear_sweep.angular_frequency
-    # FENE-P at rest: A = I + ε, f = 1 + tr ε/L² + ..., traceless in shear: a Maxwell mode
-    np.testing.assert_allclose(
-        data.linear_sweep.storage_modulus, omega**2 / (1 + omega**2), rtol=1e-10
-    )
-    np.testing.assert_allclose(data.linear_sweep.loss_modulus, omega / (1 + omega**2), rtol=1e-10)
+    moduli = data.linear_sweep.storage_modulus, data.linear_sweep.loss_modulus
+    for found, wanted in zip(moduli, (omega**2, omega), strict=True):
+        np.testing.assert_allclose(found, wanted / (1 + omega**2), rtol=1e-10)
 
 
 LEARNERS = (dc.TensorSINDy, dc.TBNNUDE)
 CHECKS = (
-    "check_parameters_default_constructible",
-    "check_no_attributes_set_in_init",
-    "check_get_params_invariance",
-    "check_set_params",
-    "check_mixin_order",
-    "check_estimator_repr",
-    "check_estimator_cloneable",
-    "check_valid_tag_types",
-)
+    "check_parameters_default_constructible", "check_no_attributes_set_in_init",
+    "check_get_params_invariance", "check_set_params", "check_mixin_order", "check_estimator_repr",
+    "check_estimator_cloneable", "check_valid_tag_types",
+)  # fmt: skip
 
 
 class ChangesItsParameters(BaseEstimator):

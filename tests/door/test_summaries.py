@@ -33,7 +33,7 @@ def right():
     return sparse_law_of("giesekus", {"alpha": 0.2})
 
 
-def test_a_library_without_the_law_says_at_first_glance_that_its_terms_are_no_finding(wrong):
+def test_a_library_without_the_law_finds_no_term_and_equation_table_and_json_have_one_sign(wrong):
     for said in (repr(wrong), wrong._repr_html_(), wrong._repr_mimebundle_()["text/html"]):
         assert "the rest is systematic" in said
         assert "No term is determined" in said
@@ -41,40 +41,6 @@ def test_a_library_without_the_law_says_at_first_glance_that_its_terms_are_no_fi
     assert len(wrong.terms_) == 3
     assert not wrong.summary()["determined"].str.startswith("yes").any()
     assert wrong.lack_of_fit_.verdict == "unexplained"
-
-
-def test_a_law_in_the_library_is_said_to_fit_and_its_term_to_be_determined(right):
-    """Negative control of the test above."""
-    assert "Fits within the noise of" in repr(right)
-    table = right.summary()
-    assert list(table.columns) == [*COLUMNS, "determined"]
-    assert table.loc["sigma.sigma", "determined"].startswith("yes")
-    # the noise of 1 % leaves a few parts in a thousand of α
-    assert table.loc["sigma.sigma", "value"] == pytest.approx(0.2, abs=0.01)
-
-
-def test_the_verdict_goes_along_in_a_file(wrong, tmp_path):
-    again = dc.load(wrong.save(tmp_path / "law.discover"))
-    assert repr(again) == repr(wrong)
-    pd.testing.assert_frame_equal(again.summary(), wrong.summary())
-    with pytest.raises(dc.InputError, match="holds no data"):
-        again.plot()
-
-
-def test_an_estimator_that_is_not_fitted_shows_its_parameters():
-    sparse = dc.TensorSINDy(max_terms=3)
-    assert repr(sparse) == "TensorSINDy(max_terms=3)"
-    assert "max_terms=3" in sparse._repr_html_()
-
-
-def test_a_law_is_drawn_with_every_run(right):
-    drawing = right.plot()
-    titles = [panel.get_title() for panel in drawing.axes if panel.get_visible()]
-    assert len(titles) == len(right.runs_)
-    assert titles[0].splitlines()[0] == right.runs_[0].name
-
-
-def test_equation_table_and_json_give_a_term_one_sign(wrong):
     term = min(wrong.terms_, key=lambda one: one.coefficient)
     assert term.coefficient < 0.0  # the control: a sign that could be lost
     assert wrong.summary().loc[term.term, "value"] == term.coefficient
@@ -86,26 +52,62 @@ def test_equation_table_and_json_give_a_term_one_sign(wrong):
     assert wrong.equation_.terms[[t.term for t in wrong.terms_].index(term.term)] == term.in_law
 
 
-def test_intervals_of_other_levels_are_those_of_a_normal_distribution():
-    class Result(SummaryView):
-        def _estimates(self):
-            return [Estimate(("a",), 2.0, (2.0 - norm.ppf(0.975), 2.0 + 2.0 * norm.ppf(0.975)))]
+def test_a_law_in_the_library_is_said_to_fit_its_term_determined_and_every_run_drawn(right):
+    """Negative control of the test above."""
+    assert "Fits within the noise of" in repr(right)
+    table = right.summary()
+    assert list(table.columns) == [*COLUMNS, "determined"]
+    assert table.loc["sigma.sigma", "determined"].startswith("yes")
+    # the noise of 1 % leaves a few parts in a thousand of α
+    assert table.loc["sigma.sigma", "value"] == pytest.approx(0.2, abs=0.01)
+    drawing = right.plot()
+    titles = [panel.get_title() for panel in drawing.axes if panel.get_visible()]
+    assert len(titles) == len(right.runs_)
+    assert titles[0].splitlines()[0] == right.runs_[0].name
 
-    low, high = Result().conf_int(0.5).loc["a"]
+
+def test_the_verdict_goes_along_in_a_file(wrong, tmp_path):
+    again = dc.load(wrong.save(tmp_path / "law.discover"))
+    assert repr(again) == repr(wrong)
+    pd.testing.assert_frame_equal(again.summary(), wrong.summary())
+    with pytest.raises(dc.InputError, match="holds no data"):
+        again.plot()
+
+
+def test_runs_fluids_data_sets_and_estimators_that_are_not_fitted_have_views():
+    sparse = dc.TensorSINDy(max_terms=3)
+    assert repr(sparse) == "TensorSINDy(max_terms=3)"
+    assert "max_terms=3" in sparse._repr_html_()
+    times = np.linspace(0.0, 5.0, 11)
+    stress = 50.0 * (1 - np.exp(-times))
+    run = dc.Run("<slow>.csv", times, dc.start_up(0.5), np.full(11, 0.5), stress)
+    assert "&lt;slow&gt;.csv" in run._repr_html_()
+    assert "<slow>" not in run._repr_html_()
+    fluid = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), [100.0, 10.0], [0.1, 1.0], 2.0)
+    view = fluid._repr_html_()
+    assert "Giesekus" in view
+    assert "22 Pa s" in view  # Σ Gλ + η_s
+    assert "<slow>" not in dc.from_dataframe(run.to_dataframe())._repr_html_()
+
+
+def test_intervals_of_other_levels_are_those_of_a_normal_distribution_and_no_constants_no_rows():
+    class Result(SummaryView):
+        def __init__(self, *estimates):
+            self.estimates = estimates
+
+        def _estimates(self):
+            return list(self.estimates)
+
+    ends = 2.0 - norm.ppf(0.975), 2.0 + 2.0 * norm.ppf(0.975)
+    one, none = Result(Estimate(("a",), 2.0, ends)), Result()
+    low, high = one.conf_int(0.5).loc["a"]
     assert (2.0 - low, high - 2.0) == pytest.approx((norm.ppf(0.75), 2.0 * norm.ppf(0.75)))
-    assert Result().summary().loc["a", "standard_error"] == pytest.approx(1.5)
+    assert one.summary().loc["a", "standard_error"] == pytest.approx(1.5)
     with pytest.raises(dc.InputError, match="between 0 and 1"):
-        Result().conf_int(95.0)
-
-
-def test_a_result_without_constants_has_an_empty_table():
-    class Result(SummaryView):
-        def _estimates(self):
-            return []
-
-    assert Result().summary().empty
-    assert list(Result().summary().columns) == COLUMNS
-    assert list(Result().conf_int().columns) == ["low", "high"]
+        one.conf_int(95.0)
+    assert none.summary().empty
+    assert list(none.summary().columns) == COLUMNS
+    assert list(none.conf_int().columns) == ["low", "high"]
 
 
 @pytest.mark.parametrize(
@@ -131,16 +133,3 @@ def test_python_and_a_study_search_the_same_library():
     study = parse_study({"data": {"folder": "a"}})
     assert study_library(study) == default_library()
     assert len(default_library()) > 8  # the control: tensors alone are another library
-
-
-def test_runs_fluids_and_data_sets_have_views():
-    times = np.linspace(0.0, 5.0, 11)
-    stress = 50.0 * (1 - np.exp(-times))
-    run = dc.Run("<slow>.csv", times, dc.start_up(0.5), np.full(11, 0.5), stress)
-    assert "&lt;slow&gt;.csv" in run._repr_html_()
-    assert "<slow>" not in run._repr_html_()
-    fluid = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), [100.0, 10.0], [0.1, 1.0], 2.0)
-    view = fluid._repr_html_()
-    assert "Giesekus" in view
-    assert "22 Pa s" in view  # Σ Gλ + η_s
-    assert "<slow>" not in dc.from_dataframe(run.to_dataframe())._repr_html_()

@@ -104,7 +104,7 @@ def test_a_mistake_is_one_error_that_says_what_was_wanted(call, message):
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
-def test_settings_of_the_wrong_kind_are_refused_before_anything_is_fitted(learner):
+def test_settings_tables_and_calls_of_the_wrong_kind_are_refused_before_anything_is_fitted(learner):
     for settings, message in (
         ({"base": "ucm"}, "base must be a Fluid"),
         ({"random_state": -1}, "whole number, at least 0"),
@@ -113,19 +113,21 @@ def test_settings_of_the_wrong_kind_are_refused_before_anything_is_fitted(learne
     ):
         with pytest.raises(dc.InputError, match=message):
             learner(**settings).fit(DATA)
-
-
-@pytest.mark.parametrize("learner", LEARNERS)
-def test_what_needs_a_fit_says_so(learner):
     for call in (learner().predict, learner().score, lambda _: learner().equation_):
         with pytest.raises(NotFittedError):
             call(DATA)
+    for table in (SAMPLES, SAMPLES[["time_s", "stress_Pa"]].to_numpy()):
+        with pytest.raises(dc.InputError, match=f"{type(table).__name__} .*from_dataframe"):
+            learner().fit(table)
 
 
-def test_half_a_character_in_a_table_is_an_input_error_and_not_one_of_a_file():
-    samples = pd.DataFrame({"time_s": [0.0, 1.0], "shear_rate_1_s": 1.0, "stress_Pa": "\ud800"})
+def test_errors_call_data_in_memory_by_its_name_and_half_a_character_is_one_of_them():
     with pytest.raises(dc.InputError, match="ud800"):
-        dc.from_dataframe(samples)
+        dc.from_dataframe(samples("slow", stress_Pa="\ud800"))
+    wrong = pd.concat([samples(name, stress_Pa="x") for name in ("slow", "fast")])
+    for name, called in (({}, "data in memory"), ({"name": "melt"}, "melt")):
+        with pytest.raises(dc.InputError, match=rf"^{called}: 2 problems\."):
+            dc.from_dataframe(wrong, **name)
 
 
 def test_lists_and_series_are_columns_too():
@@ -140,7 +142,7 @@ def test_lists_and_series_are_columns_too():
 def test_a_table_is_the_data_set_that_its_files_would_be(tmp_path):
     data = dc.load_dataset(write_folder(tmp_path / "melt"))
     samples = data.to_dataframe()
-    tables = {"lve": data.linear_sweep.to_dataframe()}
+    tables = {"lve": data.linear_sweep.to_dataframe().set_index("omega_rad_s")}
     same = dc.from_dataframe(samples, tables=tables, name="melt")
     assert repr(same) == repr(data)
     for one, other in zip(same, data, strict=True):
@@ -252,20 +254,9 @@ def test_a_name_that_no_file_can_have_is_none_of_a_run(name):
 
 
 @pytest.mark.parametrize("name", ["slow.csv", "Übung 3", "1 1/s".replace("/", "per")])
-def test_other_names_are_kept(name):
-    assert list(dc.from_dataframe(samples(name)).names) == [name]
-
-
-def test_errors_call_data_in_memory_by_its_name_and_not_by_a_folder():
-    wrong = pd.concat([samples(name, stress_Pa="x") for name in ("slow", "fast")])
-    with pytest.raises(dc.InputError, match=r"^data in memory: 2 problems\."):
-        dc.from_dataframe(wrong)
-    with pytest.raises(dc.InputError, match=r"^melt: 2 problems\."):
-        dc.from_dataframe(wrong, name="melt")
-
-
-def test_one_sample_and_one_run_are_counted_in_the_singular():
-    data = dc.from_dataframe(samples("slow").iloc[:1])
+def test_other_names_are_kept_and_one_sample_and_one_run_are_counted_in_the_singular(name):
+    data = dc.from_dataframe(samples(name).iloc[:1])
+    assert list(data.names) == [name]
     assert repr(data) == "<Dataset 'data in memory': 1 run, 1 sample>"
     assert "1 sample," in repr(data[0])
 
@@ -292,13 +283,6 @@ SAMPLES = pd.DataFrame(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("learner", LEARNERS)
-def test_a_table_in_place_of_a_data_set_is_refused_with_what_makes_one_of_it(learner):
-    for table in (SAMPLES, SAMPLES[["time_s", "stress_Pa"]].to_numpy()):
-        with pytest.raises(dc.InputError, match=f"{type(table).__name__} .*from_dataframe"):
-            learner().fit(table)
-
-
 def test_a_run_that_ends_where_it_begins_can_be_shown_but_not_followed():
     # of two runs one has lost all samples but the first
     rest = SAMPLES.head(1).assign(run="b", stress_Pa=0.2)
@@ -318,24 +302,6 @@ def test_levels_of_an_index_that_have_names_are_columns():
         np.testing.assert_array_equal(found[0].time, plain[0].time)
     # an index that repeats a column says nothing more
     assert dc.from_dataframe(SAMPLES.set_index("run", drop=False)).names == plain.names
-
-
-def test_an_estimator_is_saved_in_a_file_of_a_folder_that_is_there(tmp_path):
-    omega = np.geomspace(0.01, 100.0, 15)
-    sweep = pd.DataFrame(
-        {"omega_rad_s": omega, "Gp_Pa": 50 * omega**2 / (1 + omega**2),
-         "Gpp_Pa": 50 * omega / (1 + omega**2)}
-    )  # fmt: skip
-    data = dc.from_dataframe(SAMPLES, tables={"lve": sweep.set_index("omega_rad_s")})
-    fitted = dc.TensorSINDy(base=dc.Fluid.from_sweep(data.linear_sweep)).fit(data)
-    for path in (tmp_path, ".", ""):
-        with pytest.raises(dc.InputError, match=r"is a folder\. Name a file"):
-            fitted.save(path)
-    with pytest.raises(dc.InputError, match=r"is a folder\. Give the file that estimator\.save"):
-        dc.load(tmp_path)
-    with pytest.raises(dc.InputError, match=r"There is no folder .*absent"):
-        fitted.save(tmp_path / "absent" / "law.discover")
-    assert not list(tmp_path.iterdir())
 
 
 FLUID = dc.Fluid(UCM, [100.0], [1.0])

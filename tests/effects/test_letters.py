@@ -18,12 +18,9 @@ def letters(effect):
     return {one.symbol.removeprefix("1/") for one in effect.parameters}
 
 
-def test_no_effect_uses_a_letter_that_every_page_has():
+def test_letters_of_effects_are_their_own_whatever_their_order_and_none_of_every_pages():
     for effect in named_effects().values():
         assert not letters(effect) & RESERVED, effect.name
-
-
-def test_any_two_effects_have_different_letters_on_one_page():
     clashes = 0
     for pair in combinations(named_effects().values(), 2):
         spelled = spelled_apart(pair)
@@ -32,9 +29,12 @@ def test_any_two_effects_have_different_letters_on_one_page():
         assert len(set(own)) == len(own), [one.name for one in pair]
         clashes += bool(letters(pair[0]) & letters(pair[1]))
     assert clashes  # without any there would be nothing to spell apart
+    # a table lists effects as they were added, an equation as they act
+    for pair in combinations(named_effects().values(), 2):
+        assert spelled_apart(pair) == spelled_apart(pair[::-1]), [one.name for one in pair]
 
 
-def test_an_equation_has_the_letters_of_its_table():
+def test_an_equation_has_the_letters_of_its_table_and_an_exported_law_each_once():
     pair = map(make_effect, ("thixotropy", "thixotropic_relaxation"))
     first, second = spelled_apart(pair).values()
     assert first.equation == make_effect("thixotropic_relaxation").equation
@@ -42,15 +42,6 @@ def test_an_equation_has_the_letters_of_its_table():
         assert letter.removeprefix("1/") in second.equation
     assert r"\frac{ds'}{dt} = \frac{1 - s'}{t_\mathrm{b}'}" in second.equation
     assert r"G_k \to s'\,G_k" in second.equation
-
-
-def test_letters_do_not_depend_on_the_order_of_effects():
-    # a table lists effects as they were added, an equation as they act
-    for pair in combinations(named_effects().values(), 2):
-        assert spelled_apart(pair) == spelled_apart(pair[::-1]), [one.name for one in pair]
-
-
-def test_an_exported_law_has_each_letter_once():
     values = {"breakdown": 0.2, "build_up_time": 5.0}
     others = {"inverse_critical_rate": 2.0, "build_up_time": 7.0, "exponent": 0.5}
     states = StatePart("thixotropy", values), StatePart("thixotropic_relaxation", others)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from independent import KBKZ, Giesekus, start_up, steps
+from noisy_runs import run_at
 from vectors import vector_of
 
 import discover as dc
@@ -48,8 +49,7 @@ def test_a_loop_names_damping_by_strain_where_it_is_and_not_elsewhere(material, 
     for rate in (0.5, 2.0, 4.0):
         stress = material.respond(start_up(rate), TIMES).sigma12
         stress = stress + NOISE * np.max(stress) * lot.standard_normal(len(TIMES))
-        rates = np.full(len(TIMES), rate)
-        runs.append(dc.Run(f"at {rate:g}", TIMES, dc.start_up(rate), rates, stress))
+        runs.append(run_at(rate, TIMES, stress, f"at {rate:g}"))
     loop = dc.close_loop(
         dc.Dataset("start-ups", tuple(runs)), dc.Fluid(dc.make_law("ucm"), MODULUS, TIME),
         effects=["strain_damping", "giesekus_mobility", "thixotropy"], max_effects=1,

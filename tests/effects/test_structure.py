@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from independent import Giesekus, Structured, Thixotropic, UpperConvectedMaxwell, oscillation, steps
+from independent.noise import white
 from independent.sweeps import first_harmonic, oscillating
 from vectors import sweep_of, vector_of
 
@@ -106,10 +107,8 @@ def test_a_steady_flow_has_the_structure_of_crosss_equation(name):
     rates = np.geomspace(1e-2, 10.0, 5)
     run = Run("curve", np.arange(1.0, 6.0), protocols.steady_rates(rates), rates, np.ones(5))
     found = predicted([run], name)[0]
-    law = independent_of(name)
-    truth = [
-        law.respond(steps([0.0], [rate]), np.array([1.0, 400.0])).sigma12[-1] for rate in rates
-    ]
+    at = np.array([1.0, 400.0])
+    truth = [independent_of(name).respond(steps([0.0], [r]), at).sigma12[-1] for r in rates]
     # scipy is 30 times the slower build-up later at rest: e⁻³⁰
     np.testing.assert_allclose(found, truth, rtol=1e-6)
 
@@ -181,13 +180,12 @@ FLUIDS = {
 @pytest.mark.parametrize("name", FLUIDS)
 def test_a_loop_names_what_is_in_the_fluid_and_no_structure_with_more_constants(name):
     generator = np.random.default_rng(0)
-    runs = []
+    generator, runs = np.random.default_rng(0), []
     for rates in STEPS:
         flow = step_rates([0.0, 6.0], rates)
         stress = FLUIDS[name].respond(steps([0.0, 6.0], rates), HALVES).sigma12
-        noise = 0.01 * np.sqrt(np.mean(stress**2)) * generator.standard_normal(len(HALVES))
-        run = Run(str(rates), HALVES, flow, shear_rates(flow, HALVES), stress + noise)
-        runs.append(run)
+        stress = white(stress, 0.01, generator)
+        runs.append(Run(str(rates), HALVES, flow, shear_rates(flow, HALVES), stress))
     result = run_loop(
         Dataset(name, tuple(runs)), DeclaredModel.maxwell(100.0, 1.0), effects=CANDIDATES,
         max_effects=2, explanations=1,

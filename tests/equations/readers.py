@@ -22,7 +22,6 @@ _WORDS = (
 
 
 def module_of(text):
-    """Return what a module defines."""
     module = {}
     exec(text, module)
     return module
@@ -40,13 +39,11 @@ def sum_of_spelled(terms, stress, rate):
 
 
 def in_ufl(tensor):
-    """Return the numbers of a tensor as UFL has them."""
     ufl = pytest.importorskip("ufl")
     return ufl.as_matrix(np.asarray(tensor).tolist())
 
 
 def ufl_number(expression, place=()):
-    """Return a component of an expression of UFL."""
     pytest.importorskip("ufl")
     from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
     from ufl.utils.stacks import StackDict
@@ -63,7 +60,6 @@ def read_latex(text):
 
 
 def product_of(parts):
-    """Return the product of numbers and matrices, in their order."""
     product = parts[0]
     for part in parts[1:]:
         product = product @ part if np.ndim(product) and np.ndim(part) else product * part
@@ -210,7 +206,6 @@ class RheoToolMode:
         return (3 - squared / m) * (1 - 1 / m) / ((1 - squared / m) * (3 - 1 / m))
 
     def stress(self, state):
-        """Return the stress without the solvent's."""
         if not self.in_conformation:
             return state
         trace, time = np.trace(state), self.e["lambda" if self.type == "FENE-P" else "lambdaD"]
@@ -220,7 +215,6 @@ class RheoToolMode:
         return self.e["etaP"] / time * self.spring(trace) * (state - np.eye(3))
 
     def rate(self, state, gradient):
-        """Return the rate of change of the stress, or of the conformation."""
         e, one, trace = self.e, np.eye(3), np.trace(state)
         twice, convected = gradient + gradient.T, gradient @ state + state @ gradient.T
         if self.type == "FENE-P":
@@ -262,7 +256,6 @@ class RheoToolMode:
 
 
 def rheotool_modes(text):
-    """Return the modes of a ``constitutiveProperties`` dictionary."""
     blocks = re.findall(r"M\d+\s*\{(.*?)\}", text, re.S)
     return [RheoToolMode(block) for block in blocks or [text[text.index("parameters\n") :]]]
 

@@ -24,13 +24,9 @@ LIBRARY = build_library(
     closed_form_tensors=TENSOR_NAMES,
 )
 LAWS = {
-    "ucm": {},
-    "johnson_segalman": {"xi": 0.4},
-    "giesekus": {"alpha": 0.3},
-    "ptt_linear": {"epsilon": 0.2},
-    "ptt_exponential": {"epsilon": 0.2},
-    "fene_p": {"L2": 12.0},
-}
+    "ucm": {}, "johnson_segalman": {"xi": 0.4}, "giesekus": {"alpha": 0.3},
+    "ptt_linear": {"epsilon": 0.2}, "ptt_exponential": {"epsilon": 0.2}, "fene_p": {"L2": 12.0},
+}  # fmt: skip
 EFFECTS = [
     effect
     for effect in [
@@ -90,7 +86,6 @@ _VALUES = at_states(lambda stress, rate: LIBRARY.evaluate(stress, rate, jnp.arra
 
 
 def sum_of(indices, coefficients):
-    """Return the sum of these terms of the library."""
     terms = tuple(
         LawTerm(LIBRARY.names[i], c, {n: INNER[n] for n in LIBRARY.terms[i].inner_names})
         for i, c in zip(indices, coefficients, strict=True)
@@ -140,7 +135,6 @@ BOTH_SIGNS = {
 
 
 def agree(found, wanted, tolerance=1e-10):
-    """Whether two values of h are the same but for rounding."""
     return np.max(np.abs(np.asarray(found, float) - wanted), initial=0.0) <= tolerance * max(
         np.max(np.abs(wanted)), 1e-300
     )

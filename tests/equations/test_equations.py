@@ -5,9 +5,10 @@ import re
 
 import numpy as np
 import pytest
+from independent import Giesekus, oscillation
+from independent import start_up as flow_at
 from independent.homogeneous import UNIT
 from readers import by_rheotool, module_of, rheotool_modes, shear_quantities
-from scipy.integrate import solve_ivp
 
 from discover import equations
 from discover.equations import Tested as WhereTested
@@ -45,7 +46,6 @@ MIXED = equations.Equation(
 
 
 def simulated(fluid):
-    """Return σ12, N1 and N2 in start-up, by the package's own integrator."""
     stress = simulate(fluid, start_up(RATE), TIMES)
     normal = stress.first_normal_stress_difference, stress.second_normal_stress_difference
     return np.array([stress.shear_stress, *normal])
@@ -55,64 +55,42 @@ def agree(found, wanted, tolerance=1e-6):
     return np.max(np.abs(found - wanted)) <= tolerance * np.max(np.abs(wanted))
 
 
-def test_the_python_function_simulates_what_the_package_simulates():
+def test_the_python_function_simulates_as_the_package_does_and_json_gives_the_law_back():
     text = equations.write_equation(MIXED, "python")
     module = module_of(text)
-    assert agree(
-        np.array(module["simulate_shear"](lambda t: RATE, TIMES)), simulated(MIXED.fluid())
-    )
-    assert module["TESTED"]["judged_in"]["Wi"] == [2.0, 3.0]
+    found = np.array(module["simulate_shear"](lambda t: RATE, TIMES))
+    assert agree(found, simulated(MIXED.fluid()))
     assert "discover" not in re.findall(r"^(?:import|from) (\w+)", text, re.M)
-
-
-def giesekus_shear(rate, times, modulus, time, mobility):
-    """Return σ12, N1 and N2 of one Giesekus mode from rest at 0, component by component, by SciPy.
-
-    The equations are those of Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69, eq. 15.
-    """
-    share = mobility / (modulus * time)
-
-    def change(t, stress):
-        xx, yy, xy = stress
-        g = rate(t)
-        return [
-            2.0 * g * xy - xx / time - share * (xx * xx + xy * xy),
-            -yy / time - share * (yy * yy + xy * xy),
-            g * (modulus + yy) - xy / time - share * xy * (xx + yy),
-        ]
-
-    xx, yy, xy = solve_ivp(
-        change, (0.0, times[-1]), np.zeros(3), t_eval=times, rtol=1e-10, atol=1e-10, max_step=0.01
-    ).y
-    return np.array([xy, xx - yy, yy])
-
-
-@pytest.mark.parametrize(
-    ("rate", "times"),
-    [
-        # a record on a logarithmic axis has no sample at rest
-        (lambda t: 4.0, np.geomspace(0.2, 6.0, 7)),
-        # every sample of the rate is zero, where it is 60 between them
-        (lambda t: 60.0 * np.sin(2.0 * np.pi * t), np.array([0.5, 1.0, 1.5, 2.0])),
-    ],
-)
-def test_exported_python_starts_from_rest_at_zero_and_sees_the_rate_between_samples(rate, times):
-    modulus, time, mobility = 50.0, 0.8, 0.35
-    law = equations.Equation((LawTerm("sigma.sigma", mobility),), (modulus,), (time,))
-    module = module_of(equations.write_equation(law, "python"))
-    found = np.array(module["simulate_shear"](rate, times))
-    # fourth-order steps of 2 % of the fastest time are off by some 1e-7
-    assert agree(found, giesekus_shear(rate, times, modulus, time, mobility), 1e-5)
-    for wrong in (times[::-1], times - 1.0, np.array([0.1, np.nan])):
-        with pytest.raises(ValueError, match="times must increase from 0"):
-            module["simulate_shear"](rate, wrong)
-
-
-def test_json_gives_back_the_same_equation():
     text = equations.write_equation(MIXED, "json")
     again = equations.equation_from_json(json.loads(text))
     assert again == MIXED
     assert equations.write_equation(again, "json") == text
+
+
+@pytest.mark.parametrize(
+    ("rate", "flow", "times"),
+    [
+        # a record on a logarithmic axis has no sample at rest
+        (lambda t: 4.0, flow_at(4.0), np.geomspace(0.2, 6.0, 7)),
+        # every sample of the rate is zero, where it is 60 between them
+        (
+            lambda t: 60.0 * np.sin(2.0 * np.pi * t), oscillation(60.0, 2.0 * np.pi, -0.5 * np.pi),
+            np.array([0.5, 1.0, 1.5, 2.0]),
+        ),
+    ],
+)  # fmt: skip
+def test_exported_python_starts_from_rest_at_zero_and_sees_the_rate_between_samples(
+    rate, flow, times
+):
+    law = equations.Equation((LawTerm("sigma.sigma", 0.35),), (50.0,), (0.8,))
+    module = module_of(equations.write_equation(law, "python"))
+    wanted = Giesekus(0.35, 50.0, 0.8).respond(flow, times)
+    # fourth-order steps of 2 % of the fastest time are off by some 1e-7
+    found = np.array(module["simulate_shear"](rate, times))
+    assert agree(found, np.array([wanted.sigma12, wanted.N1, wanted.N2]), 1e-5)
+    for wrong in (times[::-1], times - 1.0, np.array([0.1, np.nan])):
+        with pytest.raises(ValueError, match="times must increase from 0"):
+            module["simulate_shear"](rate, wrong)
 
 
 @pytest.mark.parametrize("form", equations.FORMATS)
@@ -131,13 +109,10 @@ def rheotool_shear(text):
 
 
 NAMED = {
-    "ucm": ({}, "Oldroyd-B"),
-    "giesekus": ({"alpha": 0.3}, "Giesekus"),
-    "johnson_segalman": ({"xi": 0.4}, "PTT"),
-    "ptt_linear": ({"epsilon": 0.2}, "PTT"),
-    "ptt_exponential": ({"epsilon": 0.2}, "PTT"),
-    "fene_p": ({"L2": 12.0}, "FENE-P"),
-}
+    "ucm": ({}, "Oldroyd-B"), "giesekus": ({"alpha": 0.3}, "Giesekus"),
+    "johnson_segalman": ({"xi": 0.4}, "PTT"), "ptt_linear": ({"epsilon": 0.2}, "PTT"),
+    "ptt_exponential": ({"epsilon": 0.2}, "PTT"), "fene_p": ({"L2": 12.0}, "FENE-P"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -153,7 +128,7 @@ def test_rheotools_own_equations_give_the_stress_of_the_law(name):
     assert np.max(np.abs(by_source[2] - by_law[2])) < 1e-5 * np.max(np.abs(by_source[1]))
 
 
-def test_several_modes_go_to_rheotool():
+def test_several_modes_and_a_relaxation_that_was_learned_go_to_rheotool():
     equation = equations.Equation((LawTerm("sigma.sigma", 0.2),), (9.0, 3.0), (0.5, 5.0), True, 1.5)
     text = equations.write_equation(equation, "rheotool", density_kg_m3=900.0)
     assert text.count("type             Giesekus;") == 2
@@ -162,12 +137,7 @@ def test_several_modes_go_to_rheotool():
     ):
         entries = {"etaP": g * time, "lambda": time, "etaS": solvent, "alpha": 0.2, "rho": 900.0}
         assert {name: mode.e[name] for name in entries} == pytest.approx(entries)
-
-
-def test_a_relaxation_that_was_learned_becomes_another_relaxation_time():
-    """As in the paper's runs, where the relaxation too was left to the learner."""
-    bare = equations.Equation((LawTerm("sigma", 0.98),), linear_relaxation=False)
-    model = rheotool_model(bare)
+    model = rheotool_model(equations.Equation((LawTerm("sigma", 0.98),), linear_relaxation=False))
     assert (model.type, model.relax) == ("Oldroyd-B", 0.98)
 
 
@@ -187,12 +157,11 @@ def test_rheotool_is_refused_with_the_term_that_stands_in_the_way(terms, word):
 
 
 def test_a_deviation_within_the_tolerance_is_passed_over_and_said():
-    equation = equations.Equation((LawTerm(EXPONENTIAL, 0.96, {"epsilon": 0.2}),))
-    text = equations.write_equation(equation, "rheotool", tolerance=0.05)
-    assert "The factor 0.96 was taken as 1." in text
-    assert "was taken as" not in equations.write_equation(
-        equations.Equation((LawTerm(EXPONENTIAL, 1.0, {"epsilon": 0.2}),)), "rheotool"
-    )
+    for factor, said in ((0.96, True), (1.0, False)):
+        equation = equations.Equation((LawTerm(EXPONENTIAL, factor, {"epsilon": 0.2}),))
+        text = equations.write_equation(equation, "rheotool", tolerance=0.05)
+        assert (f"The factor {factor:g} was taken as 1." in text) is said
+        assert ("was taken as" in text) is said
 
 
 BAD_LAWS = [
@@ -223,15 +192,11 @@ def test_the_frequency_of_a_record_is_found_from_its_changes_of_sign(frequency):
     assert deborah == pytest.approx(0.5 * frequency, rel=0.02)
 
 
-def test_a_flow_that_does_not_oscillate_is_as_fast_as_it_is_long():
+def test_a_flow_that_does_not_oscillate_is_as_fast_as_it_is_long_and_the_box_holds_every_flow():
     times = np.linspace(0.0, 20.0, 401)
-    assert flow_numbers(times, np.full(401, 3.0), 2.0) == (6.0, 0.1)
-    reversed_once = np.where(times < 10.0, 3.0, -3.0)
-    assert flow_numbers(times, reversed_once, 2.0) == (6.0, 0.1)
+    for rate in (np.where(times < 10.0, 3.0, -3.0), np.full(401, 3.0)):
+        assert flow_numbers(times, rate, 2.0) == (6.0, 0.1)
     assert flow_numbers(times, np.zeros(401), 2.0) == (0.0, 0.1)
-
-
-def test_the_box_holds_every_flow_and_there_is_none_without_flows():
     box = box_of([(1.0, 0.5), (2.0, 0.25)])
     assert (box.weissenberg, box.deborah) == ((1.0, 2.0), (0.25, 0.5))
     assert box.text == "Wi 1 to 2, De 0.25 to 0.5"

@@ -84,9 +84,8 @@ def integrated(module, gradient):
 
     start = np.append(np.zeros(9), module["STRUCTURE_AT_REST"])
     found = followed(change, start, gradient, TIMES, rtol=1e-10, atol=1e-10)
-    return np.array(
-        [module["total_stress"](y[:9].reshape(1, 3, 3), gradient, y[9:]) for y in found]
-    )
+    totals = (module["total_stress"](y[:9].reshape(1, 3, 3), gradient, y[9:]) for y in found)
+    return np.array([*totals])
 
 
 @pytest.mark.parametrize("kind", GRADIENTS)
@@ -131,15 +130,13 @@ def states(levels, number=4):
 def by_python(name, stress, gradient, structure):
     module = written(name, "python")
     asked = stress[None], gradient, structure
-    return (
-        module["stress_rate"](*asked)[0],
-        module["structure_rate"](*asked),
-        module["total_stress"](*asked),
-    )
+    parts = "stress_rate", "structure_rate", "total_stress"
+    rate, *others = (module[part](*asked) for part in parts)
+    return rate[0], *others
 
 
 @named
-def test_sympy_says_what_python_says(name):
+def test_sympy_and_ufl_say_what_python_says(name):
     module = written(name, "sympy")
     (modulus, time), structure = module["modes"][0], module["structure"]
     for stress, gradient, levels in states(len(structure)):
@@ -158,10 +155,6 @@ def test_sympy_says_what_python_says(name):
         found = [float(one.subs(at)) for one in module["structure_rate"]]
         np.testing.assert_allclose(found, structured, rtol=1e-10)
         np.testing.assert_allclose(factor * stress, total, rtol=1e-12, atol=1e-9)
-
-
-@named
-def test_ufl_says_what_python_says(name):
     ufl = pytest.importorskip("ufl")
     module = written(name, "ufl")
     for stress, gradient, levels in states(len(module["STRUCTURE_AT_REST"]), 2):
@@ -178,14 +171,10 @@ def test_ufl_says_what_python_says(name):
 
 
 @named
-def test_json_brings_it_back(name):
-    equation = equation_of(name, CASES[name][0])
-    text = json.dumps(equation_to_json(equation))
-    assert equation_from_json(json.loads(text)) == equation
-
-
-@named
-def test_latex_has_the_equation_of_the_state_and_its_numbers(name):
+def test_json_brings_it_back_and_latex_has_the_equation_of_the_state_and_its_numbers(name):
+    values = CASES[name][0]
+    text = json.dumps(equation_to_json(equation_of(name, values)))
+    assert equation_from_json(json.loads(text)) == equation_of(name, values)
     values = CASES[name][0]
     written = write_equation(equation_of(name, values), "latex")
     effect = make_effect(name)
@@ -206,12 +195,23 @@ def test_two_states_at_once_multiply(warmed):
     assert warming == pytest.approx(1e-6 * 0.5 * MODULUS - 0.2 / 3.0)
 
 
-def test_rheotool_and_a_simulation_of_one_mode_are_refused_in_words():
+def test_rheotool_a_simulation_of_one_mode_and_a_network_are_refused_in_words():
     equation = equation_of("thixotropy", CASES["thixotropy"][0])
     with pytest.raises(InputError, match="exported to rheoTool: it has a structure variable"):
         write_equation(equation, "rheotool")
     with pytest.raises(InputError, match="no law of one mode carries"):
         equation.fluid()
+    import equinox as eqx
+    import jax
+
+    network = TensorBasisNetwork.initialise(jax.random.key(0))
+    with pytest.raises(InputError, match="projection"):
+        law_terms(network)
+    constants = jnp.zeros(8).at[3].set(0.2)
+    network = eqx.tree_at(
+        lambda n: (n.network_mask, n.constants), network, (jnp.zeros(8), constants)
+    )
+    assert law_terms(network) == (LawTerm("sigma.sigma", float(constants[3])),)
 
 
 @pytest.mark.parametrize(
@@ -230,7 +230,7 @@ def test_what_is_no_state_is_refused(effect, values, said):
 EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
 
 
-def test_one_parameter_with_two_values_keeps_both():
+def test_one_parameter_with_two_values_keeps_both_and_a_known_law_below_is_written():
     terms = tuple(LawTerm(EXPONENTIAL, c, {"epsilon": e}) for c, e in ((1.0, 0.1), (0.5, 0.3)))
     stress = jnp.asarray([0.7, 0.1, 0.2, 0.4])
     trace = 1.0
@@ -239,23 +239,6 @@ def test_one_parameter_with_two_values_keeps_both():
     np.testing.assert_allclose(extra, wanted, rtol=1e-12)
     assert r"\epsilon = 0.1" in Equation(terms).latex()
     assert r"e^{0.3 " in Equation(terms).latex()
-
-
-def test_a_network_that_is_more_than_constants_is_refused():
-    import equinox as eqx
-    import jax
-
-    network = TensorBasisNetwork.initialise(jax.random.key(0))
-    with pytest.raises(InputError, match="projection"):
-        law_terms(network)
-    constants = jnp.zeros(8).at[3].set(0.2)
-    network = eqx.tree_at(
-        lambda n: (n.network_mask, n.constants), network, (jnp.zeros(8), constants)
-    )
-    assert law_terms(network) == (LawTerm("sigma.sigma", float(constants[3])),)
-
-
-def test_a_known_law_below_is_part_of_what_is_written():
     base = make_law("giesekus", {"alpha": 0.1})
     library = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
     law = LibraryExpansion(jnp.asarray([0.2, 0.3]), jnp.zeros(0), library, base=base)
@@ -268,10 +251,9 @@ WI = 3.0
 TESTED = Where(Box((0.5, WI), (20.0, 20.0)))
 
 
-def test_a_maxwell_fluid_has_the_eigenvalue_of_its_start_up_and_twice_its_shortest_time():
+def test_eigenvalue_and_largest_step_are_those_of_start_up_and_of_what_the_flow_quickens():
     """σ12 = Wi (1 − e^−t), σ11 = 2 Wi² (1 − (1 + t) e^−t)   [Bird, Armstrong & Hassager 1987]."""
     found = in_a_solver(Equation((), (10.0,), (2.0,), tested=TESTED))
-    assert found is not None
     t = np.linspace(0.0, 10.0, 200)
     s12, s11 = WI * (1 - np.exp(-t)), 2 * WI**2 * (1 - (1 + t) * np.exp(-t))
     wanted = min(
@@ -281,15 +263,11 @@ def test_a_maxwell_fluid_has_the_eigenvalue_of_its_start_up_and_twice_its_shorte
     assert found.smallest_eigenvalue == pytest.approx(wanted, rel=1e-3)
     # four eigenvalues of -1 that are one Jordan block come out within the fourth root of 1e-16
     assert found.largest_step == pytest.approx(4.0, rel=1e-3)
-
-
-def test_the_step_follows_the_relaxation_that_the_flow_quickens():
-    """White & Metzner's relaxation rate in shear is that of the rate alone."""
+    # white & Metzner's relaxation rate in shear is that of the rate alone
     k, n, times = 0.8, 0.4, (2.0, 0.3)
     named = NamedPart("white_metzner", ({"k": k, "n": n},))
     equation = Equation((), (10.0, 5.0), times, tested=TESTED, named=named)
     found = in_a_solver(equation)
-    assert found is not None
     assert found.limiting_mode == 2
     rate = WI / equation.mean_relaxation_time * times[1]
     quickened = (1 + (k * rate) ** 2) ** ((1 - n) / 2)

@@ -91,5 +91,15 @@ class Workplace:
         assert "Traceback" not in done.stderr
         return done
 
+    def text(self, name):
+        return (self.folder / name).read_text("utf-8")
+
     def json(self, name):
-        return json.loads((self.folder / name).read_text("utf-8"))
+        return json.loads(self.text(name))
+
+    def with_data(self, study, section, *replaced):
+        """Let a study read the folder ``data`` in place of what stands before a section."""
+        text = self.text(study)
+        start, end = text.index("synthetic"), text.index(section)
+        rest = text[end:].replace(*replaced) if replaced else text[end:]
+        (self.folder / study).write_text(text[:start] + 'folder = "data"\n' + rest)

@@ -100,11 +100,7 @@ def test_a_normal_stress_that_is_determined_holds_within_two_bands(
         band = {"value": value, "low": value - half, "high": value + half}
         rows[name, "N1", "posterior"] = {"time": time, **band}
         exact = {"time": time, "value": run.columns["stress_Pa"]}
-        rows[name, "sigma12", "posterior"] = {
-            **exact,
-            "low": time + np.nan,
-            "high": time + np.nan,
-        }
+        rows[name, "sigma12", "posterior"] = {**exact, "low": time + np.nan, "high": time + np.nan}
     posterior = {"effects": [], "inclusion": {}, "unexplained_probability": 0.0}
     said = {"verdict": "explained", "posterior": posterior}
     said |= {"undetermined": [], "statements": [], **statement}

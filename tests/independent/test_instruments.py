@@ -53,15 +53,12 @@ def test_a_fault_is_in_the_stress_as_it_is_written(faults, known, tolerance):
     np.testing.assert_array_equal(nothing(run, 0.0).stress, 0.0)
 
 
-def test_steps_of_a_reading_and_a_slow_clock_are_as_written():
+def test_steps_clock_inertia_friction_and_rise_time_are_as_written():
     stepped = Instrument(adc_step=3.0).record(MAXWELL, UP, TIMES).stress
     np.testing.assert_allclose(stepped % 3.0, 0.0, atol=1e-12)
     assert np.max(np.abs(stepped - TRUE)) <= 1.5
     slow = Instrument(clock_slip=0.02).record(MAXWELL, UP, TIMES)
     np.testing.assert_allclose(slow.time, 1.02 * TIMES)
-
-
-def test_inertia_and_friction_follow_the_tool_and_not_the_fluid():
     # the trap: with slip the fluid's rate is 60 % of the tool's, and lags it
     instrument = Instrument(slip=0.02, inertia=3.0, friction=5.0)
     flow = oscillation(2.0, 1.5)
@@ -69,9 +66,6 @@ def test_inertia_and_friction_follow_the_tool_and_not_the_fluid():
     of_tool = 5.0 * np.sign(flow.rate(TIMES)) - 3.0 * 2.0 * 1.5 * np.sin(1.5 * TIMES)
     np.testing.assert_allclose(run.stress - run.true.sigma12, of_tool, atol=1e-3)
     assert rms(run.felt_rate - run.rate) > 0.3 * rms(run.rate)
-
-
-def test_rise_time_is_the_tools_own_and_inertia_feels_it():
     run = Instrument(rise_time=0.5, inertia=2.0).record(MAXWELL, UP, TIMES)
     np.testing.assert_allclose(run.tool_rate, 2.0 * (1 - decay(0.5)), atol=1e-7)
     np.testing.assert_allclose(run.stress - run.true.sigma12, 8.0 * decay(0.5), atol=1e-6)
@@ -88,14 +82,11 @@ def test_a_ringing_transducer_overshoots_as_a_damped_oscillator():
     assert np.max(ringing.stress) > 1.4
 
 
-def test_slip_of_a_power_of_the_stress_balances_the_rate_of_the_tool():
+def test_slip_of_a_power_balances_the_rate_of_the_tool_and_of_an_integral_law_is_refused():
     fluid = UpperConvectedMaxwell(100.0, 0.01)
     record = Instrument(slip=0.3, slip_power=3.0).record(fluid, start_up(1.3), np.array([0.0, 2.0]))
     stress = record.stress[-1]  # η = 1 Pa s, so that γ̇_felt = σ
     assert stress + 0.3 * stress**3 == pytest.approx(1.3, rel=1e-6)
-
-
-def test_slip_of_an_integral_law_is_refused():
     with pytest.raises(ValueError, match="rate law"):
         Instrument(slip=0.1).record(KBKZ(), start_up(1.0), TIMES)
     run = Instrument(offset=1.0).record(KBKZ(), steps([0.0, 1.0], [1.0, 0.5]), TIMES)
@@ -138,7 +129,6 @@ def test_a_folder_and_a_study_written_by_hand_are_read(tmp_path):
     read, written = dataset["b.csv"], runs["b.csv"]
     np.testing.assert_allclose(read.stress, written.stress, rtol=1e-8)
     np.testing.assert_allclose(read.second_normal_stress_difference, written.N2, rtol=1e-8)
-    assert dataset.linear_sweep is not None
     model = {"law": "giesekus", "parameters": {"alpha": 0.2}, "modulus_Pa": 50.0,
              "known_relaxation": True}  # fmt: skip
     sections = {

@@ -25,16 +25,13 @@ def test_worlds_hold_every_law_flaw_protocol_and_noise():
     assert sum(w.inside for w in worlds[::2]) > 150
 
 
-def test_a_world_is_the_same_again_and_another_by_another_seed():
+def test_a_world_is_the_same_by_its_seed_and_holds_the_law_that_it_names():
     def stress(seed):
         runs = draw_world(seed, 2).make(np.random.default_rng(0))
         return np.concatenate([run.stress for run in runs.values()])
 
     np.testing.assert_array_equal(stress(1), stress(1))
     assert not np.array_equal(stress(1), stress(2))
-
-
-def test_a_world_without_noise_holds_the_law_of_the_library_that_it_names():
     world = next(w for i in range(0, 200, 2) if (w := draw_world(1, i)).library_laws)
     exact, noisy = world.make(None), world.make(np.random.default_rng(0))
     for name, run in exact.items():
@@ -64,15 +61,12 @@ def test_an_answer_is_right_if_one_of_its_twins_names_all_that_is_there_and_no_m
     assert is_right(members, effects) == right
 
 
-def test_calibration_error_is_what_was_said_less_what_was_so():
+def test_calibration_error_is_what_was_said_less_what_was_so_and_few_cases_leave_little_open():
     said = np.array([0.9, 0.9, 0.9, 0.9, 0.1, 0.1])
     error, _ = calibration_error(said, np.array([1, 1, 1, 0, 0, 0]))
     assert error == pytest.approx(4 / 6 * 0.15 + 2 / 6 * 0.1)
     # said with certainty, and right
     assert calibration_error(np.array([1.0, 0.0]), np.array([1, 0]))[0] == 0.0
-
-
-def test_no_case_of_a_hundred_leaves_four_in_a_hundred_open():
     # Clopper & Pearson 1934: of n trials without a hit the upper end is 1 − 0.025^(1/n)
     assert share(0, 100) == f"0 of 100 (0 to {100 * (1 - 0.025 ** (1 / 100)):.0f} %)"
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from independent.noise import white
+from noisy_runs import run_at
 from scipy.stats import multivariate_normal, multivariate_t
 
-from discover.dataset import Run
 from discover.forward import DeclaredModel
 from discover.inference.engine import explain
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.priors import Deviations
 from discover.inference.engine.problem import SCATTER_OF_RUNS, Problem
-from discover.protocols import start_up
 
 RATES, NOISE = (0.3, 0.6, 1.0, 1.5, 2.0), 0.002
 TIMES = np.linspace(0.05, 8.0, 160)
@@ -20,11 +20,8 @@ def start_ups(off, rates=RATES):
     """Return start-ups of a Maxwell fluid of 1 Pa and 1 s, each with a zero of its own in Pa."""
     lot, runs = np.random.default_rng(3), []
     for rate, zero in zip(rates, off, strict=True):
-        stress = rate * (1.0 - np.exp(-TIMES))
-        size = np.sqrt(np.mean(stress**2))
-        stress = stress + zero + size * NOISE * lot.standard_normal(len(TIMES))
-        rates = np.full(len(TIMES), rate)
-        runs.append(Run(f"{rate:g}.csv", TIMES, start_up(rate), rates, stress))
+        stress = white(rate * (1.0 - np.exp(-TIMES)), NOISE, lot) + zero
+        runs.append(run_at(rate, TIMES, stress, f"{rate:g}.csv"))
     return runs
 
 
@@ -35,15 +32,12 @@ def width_of_zeros(off):
     return fitter.errors.widths(fit.linear)[fitter.errors.of_runs.start]
 
 
-def test_deviations_of_unknown_size_have_the_density_of_student_and_of_a_known_one_of_gauss():
+def test_deviations_of_unknown_size_have_students_density_and_runs_off_by_zeros_say_so():
     values = np.array([0.3, -1.2, 2.5])
     student = multivariate_t(np.zeros(3), 0.7**2 * np.eye(3), df=2.0).logpdf(values)
     assert Deviations(0.7, 2.0).log_density(values) == pytest.approx(student, rel=1e-12)
     normal = multivariate_normal(np.zeros(3), 0.7**2 * np.eye(3)).logpdf(values)
     assert Deviations(0.7).log_density(values) == pytest.approx(normal, rel=1e-12)
-
-
-def test_runs_whose_zeros_are_off_by_a_hundredth_say_so_and_sound_ones_do_not():
     # each zero is known to the noise over the root of the samples, 0.02 %
     assert width_of_zeros(np.zeros(len(RATES))) < 1.5 * SCATTER_OF_RUNS
     off = 0.01 * np.array([1.0, -1.0, 0.7, -1.3, 0.6]) * RATES

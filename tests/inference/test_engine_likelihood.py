@@ -4,6 +4,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from independent.noise import correlated
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 
@@ -25,14 +26,6 @@ def rows_of(counts, lot):
         stress = 1.0 - np.exp(-time) + 0.01 * lot.standard_normal(n)
         runs.append(dc.Run(f"{number}.csv", time, start_up(1.0), np.ones(n), stress))
     return Rows.of(runs)
-
-
-def autoregressive(correlation, n, lot):
-    """Return a stationary AR(1) sequence of variance one."""
-    out = lot.standard_normal(n)
-    for i in range(1, n):
-        out[i] = correlation * out[i - 1] + np.sqrt(1 - correlation**2) * out[i]
-    return out
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +73,8 @@ def test_the_correlation_of_noise_is_told_from_its_residual(correlation, about):
     lot = np.random.default_rng(2)
     rows = rows_of((400, 400), lot)
     sizes = np.repeat([0.01, 0.03], 400) * rows.size
-    residual = np.concatenate([autoregressive(correlation, 400, lot) for _ in range(2)]) * sizes
+    noise = [correlated(np.ones(400), 1.0, correlation, lot) - 1.0 for _ in range(2)]
+    residual = np.concatenate(noise) * sizes
     _, noise = NoiseModel(rows).log_likelihood(residual, rows.recorded)
     assert noise.correlation == about
     # of 400 samples a deviation is told to 3.5 %, of as many as 100 independent ones to 7 %

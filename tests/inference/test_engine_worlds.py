@@ -29,7 +29,6 @@ FEW = ("giesekus_mobility", "ptt_exponential", "stress_gain", "stress_offset", "
 
 
 def problem_of(folder, runs, effects):
-    """Return the problem of runs that scipy recorded, among some effects or all."""
     data = dc.load_dataset(write_folder(folder, runs))
     held = [name for name in data.names if name.startswith("held_")]
     fitted, held_out, _ = split_runs(data, None, held, None, 400)
@@ -68,22 +67,16 @@ def inside(posterior, problem):
     return np.mean((low <= rows.recorded) & (rows.recorded <= high)), np.mean(high - low)
 
 
-def test_a_law_with_a_name_is_named_alone_and_its_constant_held(asked):
+def test_a_named_law_is_named_alone_a_declared_one_needs_none_and_no_other_is_explained(asked):
     posterior, problem, world = asked[GIESEKUS]
     assert posterior.verdict == "effects_added"
     assert posterior.explanations[0].members[0] == ("giesekus_mobility",)
     low, high = posterior.interval(problem.model.positions("giesekus_mobility")[0])
     assert low <= world.constants["giesekus_mobility"]["alpha"] <= high
     assert high - low < 0.05  # 480 samples with 1 % of noise
-
-
-def test_a_fluid_that_is_as_declared_is_given_no_effect(asked):
     posterior, *_ = asked[MAXWELL]
     assert posterior.verdict == "no_effect_needed"
     assert posterior.unexplained < 0.1
-
-
-def test_a_fluid_of_no_dictionary_is_unexplained_and_what_is_left_has_a_size(asked):
     posterior, *_ = asked[POM_POM]
     assert posterior.verdict == "unexplained"
     size = posterior.discrepancy()

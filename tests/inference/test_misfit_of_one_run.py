@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from independent import Giesekus, WhiteMetzner, oscillation, start_up
+from independent.noise import white
 
 import discover as dc
 from discover.effects import library_term, make_effect
@@ -28,9 +29,8 @@ def left_by(fluid, names, seed):
     runs = []
     for i, (flow, protocol, times) in enumerate(FLOWS):
         stress = fluid.respond(flow, times).sigma12
-        noise = np.random.default_rng([seed, i]).normal(0.0, 0.01, len(times))
-        noisy = stress + np.sqrt(np.mean(stress**2)) * noise
-        rates = np.asarray(flow.rate(times), dtype=float) + np.zeros(len(times))
+        noisy = white(stress, 0.01, np.random.default_rng([seed, i]))
+        rates = np.asarray(flow.rate(times), dtype=float)
         runs.append(dc.Run(f"run_{i}", times, protocol, rates, noisy))
     effects = [make_effect("wall_slip"), make_effect("giesekus_mobility")]
     effects += [library_term(parse_term(term)) for term in TERMS]

@@ -24,13 +24,10 @@ def test_a_step_of_strain_before_the_record_counts_as_strain(duration):
     np.testing.assert_allclose(integrated_rate(run(2.0, 3.0, duration)), 2.0 + 3.0 * TIMES)
 
 
-def test_a_steady_flow_that_had_gone_on_before_the_record_does_not():
+def test_a_steady_flow_before_a_record_adds_no_strain_and_every_variable_is_a_number():
     flow = dc.after_steady_flow(dc.start_up(0.0), rate=5.0, end=4.0)
     one = dc.Run("a", TIMES, flow, np.zeros(len(TIMES)), np.exp(-TIMES), rate_before=5.0)
     np.testing.assert_array_equal(integrated_rate(one), 0.0)
-
-
-def test_every_variable_of_relaxation_after_steps_is_a_number():
     problem = Problem(DeclaredModel.maxwell([1.0], [1.0]), [], [run(0.5, 0.0), run(2.0, 0.0)])
     found = {one.slot: one for one in variables(problem.fitted)}
     assert found["network"].largest == 2.0

@@ -16,7 +16,7 @@ from tensor_library import LawTerm, LawTerms
 from tensor_library.algebra import Symmetric
 
 
-def test_the_network_is_objective_for_random_weights():
+def test_the_network_is_objective_and_a_runaway_stress_is_an_error_that_says_so(monkeypatch):
     law = TensorBasisNetwork.initialise(jax.random.key(0))
     a = jax.random.normal(jax.random.key(1), (3, 3))
     b = jax.random.normal(jax.random.key(2), (3, 3))
@@ -24,9 +24,6 @@ def test_the_network_is_objective_for_random_weights():
     s, g = a + a.T, b + b.T
     turned = law.extra_term(q @ s @ q.T, q @ g @ q.T)
     np.testing.assert_allclose(turned, q @ law.extra_term(s, g) @ q.T, atol=1e-11)
-
-
-def test_runaway_stress_is_an_error_that_says_so(monkeypatch):
     monkeypatch.setattr("discover.simulate.solve.MAX_STEPS", 20_000)  # not 400,000, for time
     with pytest.raises(SimulationError, match="diverges"):
         simulate(

@@ -9,6 +9,7 @@ from independent import RoliePolyBlend as Independent
 from independent.homogeneous import UNIT
 from independent.sweeps import first_harmonic as first_harmonic_of
 from independent.sweeps import modulus_of, oscillating
+from noisy_runs import run_at
 from scipy.integrate import solve_ivp
 
 import discover as dc
@@ -23,12 +24,9 @@ from discover.protocols import in_flow, oscillations, start_up
 from discover.simulate import simulate
 
 CONSTANTS = {
-    "long_fraction": 0.3,
-    "short_time_ratio": 0.1,
-    "stretch_time_ratio": 0.15,
-    "short_stretch_time_ratio": 0.3,
-    "beta": 0.8,
-}
+    "long_fraction": 0.3, "short_time_ratio": 0.1, "stretch_time_ratio": 0.15,
+    "short_stretch_time_ratio": 0.3, "beta": 0.8,
+}  # fmt: skip
 TIMES = np.linspace(0.05, 4.0, 40)
 PLACES = ([0, 1, 2, 0], [0, 1, 2, 1])
 
@@ -55,7 +53,6 @@ def fluid(modulus=1.0, time=1.0, **changed):
 
 
 def solved(law, rate, strain_step, kind="shear", times=TIMES):
-    """Return σ in a start-up, (n, 4)."""
     run = bare_run(in_flow(start_up(rate), kind), times)
     return components([law], make_batch([run], strain_step))[0, 0, :, :4]
 
@@ -89,11 +86,8 @@ def test_of_one_component_it_is_rolie_poly(share, time):
 def test_it_is_not_the_sum_of_its_components_by_themselves():
     """Negative control: entanglements with the other component are most of a blend."""
     found = solved(fluid(), 5.0, 0.05)[:, 3]
-    apart = 0.0
-    for share, time, name in (
-        (0.3, 1.0, "stretch_time_ratio"),
-        (0.7, 0.1, "short_stretch_time_ratio"),
-    ):
+    apart, names = 0.0, ("stretch_time_ratio", "short_stretch_time_ratio")
+    for share, time, name in zip((0.3, 0.7), (1.0, 0.1), names, strict=True):
         alone = RoliePoly(CONSTANTS["beta"], CONSTANTS[name] * time, share, time)
         apart = apart + exact(alone, 5.0 * UNIT["shear"])[:, 3]
     assert np.max(np.abs(found - apart)) > 0.1 * np.max(apart)
@@ -116,10 +110,8 @@ def without_stretch(gradient, times):
         drive = drive - np.sum(share * lost * excess, axis=1)
         drawn = np.linalg.solve(3.0 * np.eye(2) + law.release * share * excess, drive)
         carried = gradient @ a + a @ gradient.T
-        rates = lost + law.release * drawn[None, :]
-        return (
-            carried - rates[..., None, None] * (a - one) - drawn[:, None, None, None] * a
-        ).ravel()
+        rates = (lost + law.release * drawn[None, :])[..., None, None]
+        return np.ravel(carried - rates * (a - one) - drawn[:, None, None, None] * a)
 
     found = solve_ivp(change, (0, times[-1]), law.rest(), "LSODA", times, rtol=1e-9, atol=1e-11)
     return np.array([law.stress(y, gradient)[PLACES] for y in found.y.T])
@@ -138,7 +130,7 @@ def test_with_ever_shorter_rouse_times_it_becomes_the_law_without_stretch():
 
 
 @pytest.mark.slow
-def test_half_a_cycle_from_where_scipy_ends_ends_in_its_mirror_image():
+def test_half_a_cycle_ends_in_its_mirror_image_and_one_gone_on_is_one_waited_for():
     """What Newton's steps look for is what this leaves as it is."""
     strain, frequency, law = 3.0, 1.0, independent()
 
@@ -160,18 +152,13 @@ def test_half_a_cycle_from_where_scipy_ends_ends_in_its_mirror_image():
     # control: from another state it ends elsewhere
     other = half(0.5 * state).stress
     assert np.max(np.abs(other - 0.5 * state)) > 0.05 * np.max(np.abs(state))
-
-
-@pytest.mark.slow
-def test_an_oscillation_gone_on_for_ever_is_one_that_was_waited_for():
     strain, frequency, one = 3.0, 1.0, np.ones(1)
     sweep = {"strain": strain * one, "storage_modulus": one, "loss_modulus": one}
     protocol = oscillations([strain], [frequency])
     found = by_the_loop(protocol, strain * frequency * one, times=one, **sweep)
     modulus = modulus_of(independent(), strain, frequency, cycles=3)
-    np.testing.assert_allclose(
-        np.ravel(found), [modulus.real, modulus.imag], atol=1e-3 * abs(modulus)
-    )
+    wanted = [modulus.real, modulus.imag]
+    np.testing.assert_allclose(np.ravel(found), wanted, atol=1e-3 * abs(modulus))
 
 
 def test_no_flow_takes_a_conformation_away():
@@ -188,12 +175,11 @@ def test_no_flow_takes_a_conformation_away():
 def test_a_learner_told_of_it_claims_nothing_beside_it():
     """Records of its own simulator with 0.1 % noise: that the four tensors are carried along."""
     known = fluid()
-    runs = []
-    for rate in (1.0, 3.0, 6.0):
+    lot, runs = {r: np.random.default_rng(int(r)) for r in (1.0, 3.0, 6.0)}, []
+    for rate, generator in lot.items():
         stress = simulate(known, start_up(rate), TIMES).shear_stress
-        noise = 1e-3 * np.std(stress) * np.random.default_rng(int(rate)).normal(size=40)
-        runs.append(Run(f"{rate}", TIMES, start_up(rate), np.full(40, rate), stress + noise))
-    options = {"max_terms": 1}
-    sparse = dc.TensorSINDy(base=known, **options).fit(dc.Dataset("blend", tuple(runs)))
+        noise = 1e-3 * np.std(stress) * generator.normal(size=40)
+        runs.append(run_at(rate, TIMES, stress + noise))
+    sparse = dc.TensorSINDy(base=known, max_terms=1).fit(dc.Dataset("blend", tuple(runs)))
     assert sparse.terms_ == ()
     assert sparse.score(runs) > 0.995

@@ -21,12 +21,17 @@ from discover.loop.sentences import what_to_measure_next
 NOISE = 0.03
 
 
+def made(name, time, strain, rate, error=0.1, held_out=False, quantity="sigma12"):
+    ones = np.ones(len(time))
+    return RunRecord(
+        name, held_out, time, strain, time, rate, ones, ones[None], np.array([error]),
+        quantity=quantity,
+    )  # fmt: skip
+
+
 def record(name, rate, error, held_out=False, quantity="sigma12"):
     time = np.linspace(0.0, 1.0, 5)
-    return RunRecord(
-        name, held_out, time, rate * time, time, np.full(5, rate), np.ones(5), np.ones((1, 5)),
-        np.array([error]), quantity=quantity,
-    )  # fmt: skip
+    return made(name, time, rate * time, np.full(5, rate), error, held_out, quantity)
 
 
 def result(records, left=0.06, **more):
@@ -52,7 +57,6 @@ def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     found = result([*FITTED, held])
     size = (3 * 0.06 + 0.12) / 4  # the mean over runs, as everywhere
     told = with_unseen(found)
-    assert told is not None
     assert told.size == pytest.approx(size)
     assert errors_by_quantity(found)["sigma12"].inside == pytest.approx(size)
     # deviation of four normal draws
@@ -105,7 +109,7 @@ def test_a_run_beyond_the_rates_does_not_count_inside():
     assert (computed["sigma12"].beyond, computed["sigma12"].spread) == (0.2, (None, 0.2))
 
 
-def test_fitted_runs_alone_are_a_residual():
+def test_each_quantity_has_the_error_of_its_own_unseen_runs_and_fitted_ones_a_residual():
     found = result([FITTED[0]], left=None)
     found.discrepancy = {"size": 0.02, "ci95": (0.01, 0.03), "by_run": {}, "grows_with_rate": None}
     assert not with_unseen(found).unseen
@@ -114,9 +118,6 @@ def test_fitted_runs_alone_are_a_residual():
     told = errors_by_quantity(result([*FITTED, normal], left_out={}))["N1"]
     assert told.is_residual
     assert told.inside == pytest.approx(0.04)  # 0.05² = 0.04² + 0.03²
-
-
-def test_each_quantity_has_the_error_of_its_own_unseen_runs():
     pulled = [
         replace(record(name, 0.3, error, held, "tensile_stress"), flow="uniaxial")
         for name, error, held in (("pulled", 0.09, False), ("pulled fast", 0.5, True))
@@ -202,12 +203,11 @@ def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
         assert what_to_measure_next(close(declared_parameters={name: factor})) == (
             f"{again}{what} 0.52 (0.04–0.79) times the sweep's."
         )
-    # the first is next to one, within the tolerance of 10 %, and the last is no value
-    for ends in ((0.5, 0.92), (0.4, 1.1), (0.001, 60.0)):
-        same = close(declared_parameters={"modulus_factor": replace(factor, ci95=ends)})
-        assert not what_to_measure_next(same).startswith(again)
-    alone = close(declared_parameters={"modulus_Pa": replace(factor, value=0.5)})
-    assert not what_to_measure_next(alone).startswith(again)  # there is no sweep
+    # one next to one, within the tolerance of 10 %, one that is no value; and without a sweep
+    others = [{"modulus_factor": replace(factor, ci95=ends)}
+              for ends in ((0.5, 0.92), (0.4, 1.1), (0.001, 60.0))]  # fmt: skip
+    for other in (*others, {"modulus_Pa": replace(factor, value=0.5)}):
+        assert not what_to_measure_next(close(declared_parameters=other)).startswith(again)
 
 
 def close(records=FITTED, **more):
@@ -215,7 +215,7 @@ def close(records=FITTED, **more):
     return result(records, tolerance=0.1, **more)
 
 
-def test_what_was_measured_comes_before_another_stress_where_it_is_not_described():
+def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_first():
     pulled = replace(record("pulled", 0.3, 0.4, quantity="tensile_stress"), flow="uniaxial")
     found = result([*FITTED, pulled])  # misses of 6 %, tolerance 5 %
     found.discrepancy["by_run"] = {"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4}
@@ -352,33 +352,26 @@ def test_a_flow_curve_that_falls_says_from_which_rate(alpha):
     assert found == pytest.approx(peak, rel=0.15)
 
 
-def test_an_oscillation_has_the_amplitude_of_its_strain_and_a_table_of_states_is_steady():
+def test_an_oscillation_has_an_amplitude_states_are_steady_and_linear_runs_no_derivative():
     time = np.linspace(0.0, 4.0 * np.pi, 801)
-    wave = RunRecord(
-        "wave", False, time, 0.4 * np.sin(2.0 * time), time, 0.8 * np.cos(2.0 * time),
-        np.ones(801), np.ones((1, 801)), np.array([0.1]),
-    )  # fmt: skip
+    wave = made("wave", time, 0.4 * np.sin(2.0 * time), 0.8 * np.cos(2.0 * time))
     told = range_of([wave])
     assert told.amplitude == pytest.approx((0.4, 0.4), rel=1e-3)  # its samples miss the peak
     assert range_of([wave, FITTED[0]]).amplitude is None
     assert range_of([replace(FITTED[0], control="steady")]).steady
     assert not range_of(FITTED).steady
+    close, apart = Spread(0.01, 0.02), Spread(0.5, 0.6)
+    assert not shows_a_derivative(result(FITTED, spread_of_laws={"N1": apart}))
+    assert not shows_a_derivative(result(FITTED, spread_of_laws={}))
+    assert shows_a_derivative(result(FITTED, spread_of_laws={"N1": close}))
+    normal = record("slow", 0.1, 0.05, quantity="N1")
+    assert shows_a_derivative(result([*FITTED, normal], spread_of_laws={"N1": apart}))
 
 
-def test_a_range_of_rates_is_where_runs_stay():
+def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():
     time = np.linspace(0.0, 60.0, 601)
-    step = np.where(time < 0.3, 10.0, 0.1)  # measured while it falls from the rate before
-    down = RunRecord(
-        "down",
-        False,
-        time,
-        0.1 * time,
-        time,
-        step,
-        np.ones(601),
-        np.ones((1, 601)),
-        np.array([0.1]),
-    )
+    # measured while it falls from the rate before
+    down = made("down", time, 0.1 * time, np.where(time < 0.3, 10.0, 0.1))
     assert range_of([down]).rate_1_s == pytest.approx((0.1, 10.0))
     assert range_of(FITTED).rate_1_s == pytest.approx((0.1, 1.0))
     wave = record("wave", 1.0, 0.1)
@@ -394,15 +387,6 @@ def test_a_range_of_rates_is_where_runs_stay():
     turns = replace(wave, rate=np.array([2.0, 0.1, -2.0, 0.1, 2.0]))
     assert not range_of([turns]).tests
     assert range_of([turns]).rate_1_s == pytest.approx((2.0, 2.0))  # its amplitude
-
-
-def test_linear_response_alone_names_no_convected_derivative():
-    close, apart = Spread(0.01, 0.02), Spread(0.5, 0.6)
-    assert not shows_a_derivative(result(FITTED, spread_of_laws={"N1": apart}))
-    assert not shows_a_derivative(result(FITTED, spread_of_laws={}))
-    assert shows_a_derivative(result(FITTED, spread_of_laws={"N1": close}))
-    normal = record("slow", 0.1, 0.05, quantity="N1")
-    assert shows_a_derivative(result([*FITTED, normal], spread_of_laws={"N1": apart}))
 
 
 @pytest.mark.parametrize(("missed", "inside"), [(0.66, None), (0.1, 0.1), (0.01, 0.05)])

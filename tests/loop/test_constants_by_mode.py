@@ -9,6 +9,7 @@ from independent import start_up as flow
 from independent.folders import write_table
 from independent.homogeneous import GiesekusFluid
 from independent.noise import white
+from noisy_runs import run_at
 
 import discover as dc
 from discover.dataset import Dataset, Run
@@ -37,8 +38,15 @@ def data(mobilities, rates=RATES):
     for rate in rates:
         times = np.geomspace(0.02, 12.0, 50) / np.sqrt(rate)
         stress = white(fluid.respond(flow(rate), times).sigma12, NOISE, generator)
-        runs.append(Run(f"{rate}", times, start_up(rate), np.full(len(times), rate), stress))
+        runs.append(run_at(rate, times, stress, f"{rate}"))
     return Dataset("three modes", tuple(runs))
+
+
+def assert_near(modes, mobilities):
+    """Assert that each lies in twice its interval: of six of 95 % one may miss."""
+    for mode, mobility in zip(modes, mobilities, strict=True):
+        low, high = mode.ci95
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
 
 
 @cache
@@ -60,22 +68,23 @@ def test_the_constant_of_each_mode_is_found(mobilities):
     # the noise alone is left
     assert result.error_after.fit == pytest.approx(NOISE, rel=0.1)
     assert result.differing_by_mode == ("alpha",)
-    for mode, mobility in zip(found.modes, mobilities, strict=True):
-        low, high = mode.ci95
-        # twice the interval: of six of 95 % one may miss
-        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
-        assert high - low < 0.1
-        assert not mode.left_open
+    assert_near(found.modes, mobilities)
+    for mode in found.modes:
+        assert mode.ci95[1] - mode.ci95[0] < 0.1
     # one constant leaves some 9 %
     assert found.evidence[-1] > 100.0
 
 
 @pytest.mark.slow
-def test_a_mode_that_no_flow_reaches_is_not_determined():
+def test_a_mode_that_no_flow_reaches_is_not_determined_and_the_picture_says_so():
     # at 1 1/s the fastest mode feels a Weissenberg number of 0.05
-    slow = loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).declared_parameters["alpha"]
+    loop_of_slow = loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0))
+    slow = loop_of_slow.declared_parameters["alpha"]
     assert [mode.left_open for mode in slow.modes] == [False, False, True]
     assert slow.modes[2].ci95 is None
+    drawn = by_mode_picture(loop_of_slow.by_mode, False)
+    assert "not determined by these data" in drawn.svg
+    assert by_mode_picture({}, False) is None
 
 
 @pytest.mark.slow
@@ -91,7 +100,6 @@ def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
     for mode, same in zip(found.modes, of_law.modes, strict=True):
         assert mode.value == pytest.approx(same.value, rel=1e-2)
     named = result.equation().named
-    assert named is not None
     assert named.law == "giesekus"
     assert [one["alpha"] for one in named.constants] == [mode.value for mode in found.modes]
     # and with equal mobilities it stays one constant
@@ -116,17 +124,12 @@ def test_a_library_term_by_mode_that_does_not_differ_is_the_term():
     assert np.max(np.abs(varied / predicted[1] - 1.0)) > 1e-3
 
 
-CONSTANTS = {
-    "alpha": lambda: DeclaredModel.named(
-        "giesekus", {"alpha": 0.3}, MODULI, TIMES, free=["alpha"], by_mode=("alpha",)
-    ),
-    "giesekus_mobility": lambda: DeclaredModel.maxwell(
-        MODULI,
-        TIMES,
-        effects=known_effects({"giesekus_mobility": "fit"}),
-        by_mode=("giesekus_mobility",),
-    ),
-}
+def declared_by(name):
+    if name == "alpha":
+        known, how = {"alpha": 0.3}, {"free": ["alpha"], "by_mode": ("alpha",)}
+        return DeclaredModel.named("giesekus", known, MODULI, TIMES, **how)
+    effects = known_effects({name: "fit"})
+    return DeclaredModel.maxwell(MODULI, TIMES, effects=effects, by_mode=(name,))
 
 
 @pytest.mark.parametrize(
@@ -139,8 +142,7 @@ CONSTANTS = {
 )  # fmt: skip
 def test_the_forward_model_gives_each_mode_its_constant(kind, name):
     mobilities = np.array([0.1, 0.3, 0.6])
-    declared = CONSTANTS[name]()
-    model = AugmentedModel(declared, [])
+    model = AugmentedModel(declared_by(name), [])
     theta = model.zero()
     theta[model.constant(name)[1]] = 0.3
     deviations = np.log(mobilities / (1.0 - mobilities)) - np.log(0.3 / 0.7)
@@ -171,24 +173,13 @@ def test_a_flow_curve_tells_each_constant(tmp_path):
         curve, base, free=["alpha"], by_mode=["alpha"], effects=["stress_gain"], max_effects=0
     ).declared_parameters["alpha"]
     assert found.degree > 0
-    for mode, mobility in zip(found.modes, mobilities, strict=True):
-        low, high = mode.ci95
-        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
-
-
-@pytest.mark.slow
-def test_the_picture_says_what_is_determined_and_what_is_not():
-    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).by_mode, False)
-    assert drawn is not None
-    assert "not determined by these data" in drawn.svg
-    assert by_mode_picture({}, False) is None
+    assert_near(found.modes, mobilities)
 
 
 def test_a_law_by_mode_is_written_out_with_the_constants_of_each():
     result = loop((0.1, 0.3, 0.6))
     assert result.fluid is None
     named = result.equation().named
-    assert named is not None
     assert named.law == "giesekus"
     found = [mode.value for mode in result.declared_parameters["alpha"].modes]
     assert [one["alpha"] for one in named.constants] == pytest.approx(found)
@@ -222,29 +213,26 @@ def test_what_cannot_differ_by_mode_is_refused(options, text):
         dc.close_loop(data((0.3, 0.3, 0.3)), base, **({"free": ["alpha"]} | options))
 
 
-def told_maxwell(mobilities, rates=RATES):
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mobilities", "differing"), [((0.1, 0.3, 0.6), ("giesekus_mobility",)), ((0.3, 0.3, 0.3), ())]
+)
+def test_constants_that_differ_by_mode_are_found_unasked_and_one_that_explains_the_runs_stays_one(
+    mobilities, differing
+):
     base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
     # other explanations change neither stages nor constants by mode
     asked = {"effects": ["giesekus_mobility", "stress_gain"], "max_effects": 2, "explanations": 1}
-    return dc.close_loop(data(mobilities, rates), base, held_out=[f"{rates[2]}"], **asked)
-
-
-@pytest.mark.slow
-def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_for():
-    result = told_maxwell((0.1, 0.3, 0.6))
+    result = dc.close_loop(data(mobilities), base, held_out=[f"{RATES[2]}"], **asked)
     assert result.verdict == "effects_added"
     assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
-    assert result.differing_by_mode == ("giesekus_mobility",)
-    assert result.error_after.held_out == pytest.approx(NOISE, rel=0.3)  # 50 samples of noise
-
-
-@pytest.mark.slow
-def test_control_one_constant_that_explains_the_runs_stays_one():
-    result = told_maxwell((0.3, 0.3, 0.3))
-    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
-    assert result.differing_by_mode == ()
-    low, high = result.stages[0].parameters["alpha"].ci95
-    assert low < 0.3 < high
+    assert result.differing_by_mode == differing
+    if differing:
+        # 50 samples of noise
+        assert result.error_after.held_out == pytest.approx(NOISE, rel=0.3)
+    else:
+        low, high = result.stages[0].parameters["alpha"].ci95
+        assert low < 0.3 < high
 
 
 def test_a_search_with_constants_by_mode_fits_nothing_again_that_has_none(monkeypatch):

@@ -8,6 +8,7 @@ import fewer_hypotheses
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent.noise import white
 
 from discover.dataset import Dataset, Run, load_dataset, relaxation_spectrum
 from discover.errors import InputError
@@ -28,14 +29,9 @@ FLOWS = {
 }
 # enough to be wrong with, few enough to be quick; the whole dictionary is tried on measured data
 EFFECTS = (
-    "giesekus_mobility",
-    "non_affine_motion",
-    "ptt_linear",
-    "rate_gain",
-    "rate_rise_time",
-    "stress_offset",
-    "tr(sigma)*gammadot",
-)
+    "giesekus_mobility", "non_affine_motion", "ptt_linear", "rate_gain", "rate_rise_time",
+    "stress_offset", "tr(sigma)*gammadot",
+)  # fmt: skip
 OTHERS = ("giesekus_mobility", "ptt_exponential", "transducer_lag", "wall_slip")
 
 
@@ -51,9 +47,7 @@ def make_dataset(law, noise=0.01, rise=0.0, seed=0):
             felt = measured_rate(dense, rate[0] * (1 - np.exp(-dense / rise)))
         elif rise:
             continue  # the lagged oscillation is not needed to find the lag
-        stress = simulate(fluid, felt, TIMES).shear_stress
-        scale = noise * np.sqrt(np.mean(stress**2))
-        stress = stress + scale * generator.standard_normal(len(TIMES))
+        stress = white(simulate(fluid, felt, TIMES).shear_stress, noise, generator)
         runs.append(Run(name, TIMES, flow, rate, stress))
     return Dataset("made", tuple(runs))
 
@@ -111,6 +105,11 @@ def test_a_planted_mobility_is_found_named_and_predicts_the_held_out_run(planted
     assert alpha.ci95[0] < 0.2 < alpha.ci95[1]
     assert alpha.ci95[1] - alpha.ci95[0] < 0.05
     assert result.error_after.held_out < 0.015 < 0.1 < result.error_before.held_out
+    # its fluid is the law that was planted: no instrument effect was found, so they differ by what
+    # a sound bench is off, and 1 % noise tells to some thousandths
+    record = next(r for r in result.records if r.name == "fast")
+    alone = simulate(result.fluid, FLOWS["fast"], TIMES).shear_stress
+    np.testing.assert_allclose(alone, record.predicted[-1], atol=5e-3 * np.max(alone))
 
 
 @pytest.mark.slow
@@ -124,7 +123,9 @@ def test_a_planted_rise_time_is_found_or_its_declared_alias():
     assert result.verdict == "effects_added"
 
 
-def test_the_json_follows_the_contract(planted_mobility, tmp_path):
+def test_the_json_follows_the_contract_and_records_hold_what_pictures_need(
+    planted_mobility, tmp_path
+):
     planted_mobility.write_json(tmp_path / "loop.json")
     contents = json.loads((tmp_path / "loop.json").read_text())
     wanted = {"verdict", "error_before", "error_after", "noise_floor", "stages", "remaining"}
@@ -134,17 +135,6 @@ def test_the_json_follows_the_contract(planted_mobility, tmp_path):
     assert set(stage["error"]) == {"fit", "held_out"}
     assert {"value", "ci95", "unit"} <= set(stage["parameters"]["alpha"])
     assert contents["error_after"]["fit"] == stage["error"]["fit"]
-
-
-def test_the_augmented_fluid_is_the_law_that_was_planted(planted_mobility):
-    record = next(r for r in planted_mobility.records if r.name == "fast")
-    alone = simulate(planted_mobility.fluid, FLOWS["fast"], TIMES).shear_stress
-    # no instrument effect was found, so they differ by what a sound bench is off, and 1 % noise
-    # tells to some thousandths
-    np.testing.assert_allclose(alone, record.predicted[-1], atol=5e-3 * np.max(alone))
-
-
-def test_the_records_hold_what_pictures_need(planted_mobility):
     result = planted_mobility
     assert [r.name for r in result.records] == ["slow", "fast", "laos", "late"]
     assert [r.held_out for r in result.records] == [False, False, False, True]
@@ -186,13 +176,6 @@ def test_bad_input_is_refused_with_one_message(options, message):
         loop(make_dataset(UpperConvectedMaxwell()), **options)
 
 
-@pytest.mark.slow
-def test_a_noise_that_is_given_is_believed():
-    dataset = make_dataset(Giesekus(0.2))
-    result = loop(dataset, effects=("stress_offset",), noise=0.9, max_effects=1)
-    assert result.noise_floor == 0.9
-
-
 MELT_CANDIDATES = [
     "rate_rise_time", "transducer_lag", "time_delay", "stress_gain", "stress_offset",
     "tool_compliance", "wall_slip", "giesekus_mobility", "ptt_linear", "tr(sigma)*gammadot",
@@ -202,7 +185,6 @@ MELT_CANDIDATES = [
 @pytest.mark.slow
 def test_one_instrument_effect_cuts_the_held_out_error_of_the_melt_fourfold(measured_data):
     dataset = load_dataset(measured_data / "pi95k-startup", clock_factor="time_factor")
-    assert dataset.linear_sweep is not None
     spectrum = relaxation_spectrum(dataset.linear_sweep)
     result = run_loop(
         dataset,
@@ -211,11 +193,8 @@ def test_one_instrument_effect_cuts_the_held_out_error_of_the_melt_fourfold(meas
         ),
         held_out=[name for name in dataset.names if "Tm23" in name],
         # the study has the whole dictionary; ten candidates here, for the time that tests may take
-        effects=MELT_CANDIDATES,
-        max_effects=1,
-        explanations=1,
-        strain=(0.0, 0.4),
-    )
+        effects=MELT_CANDIDATES, max_effects=1, explanations=1, strain=(0.0, 0.4),
+    )  # fmt: skip
     (stage,) = result.stages
     assert stage.kind in ("kinematic", "signal")
     assert len(stage.parameters) == 1
@@ -226,13 +205,9 @@ def test_one_start_up_gives_the_law_though_modulus_and_time_are_unknown_too():
     # fitted without the effect, the constants stand where every small amount of it is worse
     dataset = make_dataset(Giesekus(0.3), noise=0.002)
     declared = DeclaredModel.maxwell(10.0, 3.0, fit_modulus=True, fit_relaxation_time=True)
-    result = run_loop(
-        Dataset("one", (dataset["fast"],)),
-        declared,
-        effects=["giesekus_mobility", "thixotropy", "tool_compliance", "stress_offset"],
-        max_effects=2,
-        explanations=1,
-    )
+    effects = ["giesekus_mobility", "thixotropy", "tool_compliance", "stress_offset"]
+    one, how = Dataset("one", (dataset["fast"],)), {"max_effects": 2, "explanations": 1}
+    result = run_loop(one, declared, effects=effects, **how)
     assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
     for name, value in (("modulus_Pa", 100.0), ("relaxation_time_s", 1.0)):
         low, high = result.declared_parameters[name].ci95

@@ -13,7 +13,6 @@ NAMES = sorted(path.stem for path in NOTEBOOKS.glob("*.py"))
 
 
 def executed_text(name, monkeypatch):
-    """Return what a notebook prints and shows, markup and plain text."""
     jupytext = pytest.importorskip("jupytext")
     nbclient = pytest.importorskip("nbclient")
     # what one notebook or another test compiled, the next need not compile again
@@ -83,7 +82,6 @@ def test_the_measured_notebook_goes_round_the_circle(measured_data, monkeypatch)
     text = executed_text("measured", monkeypatch)
     # the rate comes up late, as the whole set says too (docs/findings.md: 20.8 to 23.5 ms)
     tau = re.search(r"'rate_rise_time': \{'tau': ([\d.]+)\}", text)
-    assert tau is not None
     assert 0.018 < float(tau.group(1)) < 0.026
     # no law that was tried explains these runs, and σ12 does not say N2
     assert re.search(r"unexplained \| not determined: .*N2", text)

@@ -175,14 +175,11 @@ def test_no_step_is_seen_in(rate):
     assert steps(rate) == ()
 
 
-def test_a_step_whose_instant_is_given_is_not_in_question():
+def test_a_step_whose_instant_is_given_or_at_an_end_of_a_record_is_not_in_question():
     given = dc.step_rates([0.0, 3.93], [1.0, 3.0])
     assert steps(STEP, protocol=given) == ()
     assert len(steps(STEP, protocol=measured_rate(TIMES, STEP))) == 1
-
-
-def test_a_step_at_either_end_of_a_record_is_no_step():
-    """One sample beyond it tells nothing of where it happened that its own error does not hide."""
+    # one sample beyond it tells nothing of where it happened that its own error does not hide
     for edge in (1, 80):
         rate = np.where(np.arange(81) < edge, 1.0, 3.0)
         assert steps(rate) == ()

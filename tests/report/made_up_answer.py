@@ -1,7 +1,11 @@
 """An answer that is made up: a melt with one suspect and one open normal stress."""
 
+from dataclasses import replace
+
 from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
 from discover.equations import Equation
+from discover.report.first_screen import answer_screen
+from discover.report.page import render
 from tensor_library.law_terms import LawTerm
 
 MELT = Answer(
@@ -21,3 +25,15 @@ MELT = Answer(
     next_test="Repeat one shear run on a second filling.",
     equation=Equation((LawTerm("tr(sigma)*sigma", 0.82),), (1000.0, 100.0), (1.0, 10.0)),
 )  # fmt: skip
+
+
+def headline(answer=MELT, **changes):
+    return replace(answer, **changes).headline
+
+
+def screen_of(answer=MELT, **changes):
+    return answer_screen(replace(answer, **changes))
+
+
+def page_of(answer=MELT, **changes):
+    return render("answer.html", screen=screen_of(answer, **changes))

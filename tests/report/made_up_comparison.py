@@ -18,43 +18,30 @@ from tensor_library.law_terms import LawTerms
 NOT_THERE = (None, float("nan"), float("inf"))
 TIMES = np.linspace(0.0, 10.0, 41)
 ROW = {
-    "log_evidence": 0.0,
-    "size": 1,
-    "support": ["sigma.sigma"],
-    "inner": {},
-    "misfit": 0.02,
+    "log_evidence": 0.0, "size": 1, "support": ["sigma.sigma"], "inner": {}, "misfit": 0.02,
     "held_out": 0.03,
-}
+}  # fmt: skip
 
 
 def flow(name, kind):
-    protocol = oscillatory_shear(1.0, 1.0)
-    stress = np.sin(TIMES)
-    return Flow(
-        name,
-        kind,
-        protocol,
-        TIMES,
-        np.cos(TIMES),
-        {"sigma12": stress},
-        stress if kind == "training" else None,
-        oscillatory=True,
-    )
+    stress, oscillates = np.sin(TIMES), oscillatory_shear(1.0, 1.0)
+    measured = stress if kind == "training" else None
+    told = {"sigma12": stress}
+    return Flow(name, kind, oscillates, TIMES, np.cos(TIMES), told, measured, oscillatory=True)
 
 
 def outcome(learner, number, predicted, verdict="explained"):
     """Return an outcome in which every number that may be missing is `number`."""
     ends = None if number is None else (number, number)
     term = RecoveredTerm("sigma.sigma", 0.2, coefficient_penalised=number, ci95=ends)
-    path = [{**ROW, "size": 0, "support": [], "misfit": 0.4}, {**ROW}]
-    for row in path:
-        row["held_out"] = number
+    path = [
+        {**ROW, "size": 0, "support": [], "misfit": 0.4, "held_out": number},
+        {**ROW, "held_out": number},
+    ]
     details = {
-        "path": path,
-        "inclusion": {"sigma.sigma": 0.5},
-        "misfit": number,
+        "path": path, "inclusion": {"sigma.sigma": 0.5}, "misfit": number,
         "coefficients": {"sigma": {"mean": number, "spread": number}},
-    }
+    }  # fmt: skip
     stresses = {q: np.sin(TIMES) for q in ("sigma12", "N1", "N2")} if predicted else None
     keys = ("training/a", "held_out/b")
     predictions, left = dict.fromkeys(keys, stresses), LackOfFit(verdict, 0.01, 0.01, 0.0, 0.9)
@@ -69,29 +56,22 @@ def posterior(verdict, number):
 
 
 def made_up(number=0.01, predicted=True, sparse="explained", network="explained", **changes):
-    """Return a comparison that nothing computed."""
     flows = [flow("a", "training"), flow("b", "held_out")]
     learners = {"tensor_sindy": sparse, "tbnn_ude": network}
     learners = {name: verdict for name, verdict in learners.items() if verdict}
     apart = dict.fromkeys(("sigma12", "N1", "N2"), number)
     rival = Rival(LawTerms({"sigma": 0.1}), "A twin.", apart)
+    statements = [
+        Statement("N1", IN_LIBRARY, "If the law is in the library, σ12 gives N1."),
+        Statement("N2", "no", "No."),
+    ]
     content = {
-        "name": "made up",
-        "data_summary": "none",
-        "known_part": "Maxwell",
-        "flows": flows,
-        "before": {f.key: None for f in flows},
+        "name": "made up", "data_summary": "none", "known_part": "Maxwell", "flows": flows,
+        "before": {f.key: None for f in flows}, "truth": None, "noise": None, "rivals": [rival],
         "outcomes": {name: outcome(name, number, predicted, one) for name, one in learners.items()},
-        "truth": None,
-        "noise": None,
-        "rivals": [rival],
-        "statements": [
-            Statement("N1", IN_LIBRARY, "If the law is in the library, σ12 gives N1."),
-            Statement("N2", "no", "No."),
-        ],
-        "posterior": posterior(sparse or network, number),
+        "statements": statements, "posterior": posterior(sparse or network, number),
         "shares": {"tensor_sindy": 0.9},
-    }
+    }  # fmt: skip
     return Comparison(**{**content, **changes})
 
 

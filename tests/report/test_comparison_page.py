@@ -136,11 +136,10 @@ def test_errors_inside_and_beyond_the_range_are_told_apart_and_so_is_a_runaway()
 
 
 def test_a_sum_stands_in_brackets_behind_its_coefficient():
-    terms = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "(exp(epsilon*tr(sigma))-1)*sigma")
-    one = replace(outcome("tensor_sindy", 0.01, False), terms=tuple(
-        RecoveredTerm(name, 0.2) for name in terms
-    ))  # fmt: skip
-    assert terms_text(one) == "0.2 σ·σ, 0.2 (σ·γ̇+γ̇·σ), 0.2 (exp(ε tr(σ))-1) σ"
+    names = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "(exp(epsilon*tr(sigma))-1)*sigma")
+    terms = tuple(RecoveredTerm(name, 0.2) for name in names)
+    said = "0.2 σ·σ, 0.2 (σ·γ̇+γ̇·σ), 0.2 (exp(ε tr(σ))-1) σ"
+    assert terms_text(replace(outcome("tensor_sindy", 0.01, False), terms=terms)) == said
 
 
 def test_a_notebook_is_told_the_verdict_first():

@@ -23,9 +23,9 @@ OMEGA = np.geomspace(0.1, 100.0, 12)
 def sweeps(folder):
     """Write a linear sweep, an amplitude sweep ten times too large, and a flow curve."""
     write_table(folder / "lve.csv", maxwell_sweep([100.0], [1.0], OMEGA))
-    strain = np.geomspace(0.01, 1.0, 6)
-    columns = {"strain": strain, "omega_rad_s": np.full(6, 1.0)}
-    columns |= {"Gp_Pa": np.full(6, 500.0), "Gpp_Pa": np.full(6, 500.0)}
+    six = np.full(6, 500.0)
+    columns = {"strain": np.geomspace(0.01, 1.0, 6), "omega_rad_s": np.ones(6)}
+    columns |= {"Gp_Pa": six, "Gpp_Pa": six}
     write_table(folder / "amplitude_sweep.csv", columns)
     write_table(folder / "flow_curve.csv", {"shear_rate_1_s": OMEGA, "stress_Pa": 10.0 * OMEGA})
     return folder
@@ -36,11 +36,9 @@ def runs(folder):
     time = np.geomspace(0.01, 10.0, 30)
     names = ["slow.csv", "<b>fast.csv", "middle.csv"]
     for name, rate in zip(names, (0.1, 5.0, 1.0), strict=True):
+        columns = {"time_s": time, "shear_rate_1_s": np.full(30, rate)}
         stress = 100.0 * rate * (1.0 - np.exp(-time))
-        write_table(
-            folder / name,
-            {"time_s": time, "shear_rate_1_s": np.full(30, rate), "stress_Pa": stress},
-        )
+        write_table(folder / name, columns | {"stress_Pa": stress})
     (folder / "runs.csv").write_text("file\n" + "\n".join(names) + "\n")
     return folder
 
@@ -49,27 +47,36 @@ def page_of(folder):
     return data_page(load_dataset(folder), check_folder(folder), str(folder))
 
 
+def drawn(page):
+    return re.findall(r'<figure id="(\w+)"', page)
+
+
+@pytest.fixture
+def show(tmp_path):
+    """Return what shows a folder of sweeps, and where the page is to lie."""
+    (tmp_path / "melt").mkdir()
+    sweeps(tmp_path / "melt")
+    words = ["data", "show", str(tmp_path / "melt"), "--out", str(tmp_path / "seen")]
+    return lambda: CliRunner().invoke(app, words), tmp_path / "seen"
+
+
 def test_every_test_is_drawn_and_named_and_markup_in_a_name_is_text(tmp_path):
     page = page_of(runs(sweeps(tmp_path)))
-    assert re.findall(r'<figure id="(\w+)"', page) == [
-        "runs", "linear_sweep", "amplitude_sweep", "flow_curve",
-    ]  # fmt: skip
+    assert drawn(page) == ["runs", "linear_sweep", "amplitude_sweep", "flow_curve"]
     for kind in ("start-up", "frequency sweep", "amplitude sweep", "flow curve"):
         assert f'<td class="text">{kind}</td>' in page
     assert "<b>fast" not in page
     assert not re.search(r'(src|href)="(?!#)', page)
 
 
-def test_only_what_is_there_is_drawn(tmp_path):
-    page = page_of(runs(tmp_path))
-    assert re.findall(r'<figure id="(\w+)"', page) == ["runs"]
-
-
-def test_what_the_check_doubts_stands_on_the_page(tmp_path):
+def test_only_what_is_there_is_drawn_and_what_the_check_doubts_is_said(tmp_path):
     page = page_of(sweeps(tmp_path))
+    assert drawn(page) == ["linear_sweep", "amplitude_sweep", "flow_curve"]
     # √2 · 500 Pa where the linear sweep has √2 · 50 Pa
     assert "is 10 times that of lve.csv" in page
     assert "nothing doubtful" not in page
+    (tmp_path / "runs").mkdir()
+    assert drawn(page_of(runs(tmp_path / "runs"))) == ["runs"]
 
 
 @pytest.mark.parametrize("write", [sweeps, runs, lambda folder: runs(sweeps(folder))])
@@ -86,36 +93,23 @@ def test_the_study_to_start_from_loads_with_its_model(tmp_path, write):
         assert len(data.fit) == 3
 
 
-def test_the_command_writes_page_and_study_and_says_where(tmp_path):
-    folder = tmp_path / "melt"
-    folder.mkdir()
-    out = tmp_path / "seen"
-    shown = CliRunner().invoke(app, ["data", "show", str(sweeps(folder)), "--out", str(out)])
+def test_the_command_writes_page_and_study_says_where_and_keeps_what_is_somebody_s(tmp_path, show):
+    (look, out), folder = show, tmp_path / "melt"
+    shown = look()
     assert shown.exit_code == 0
     assert "amplitude sweep" in shown.output
-    assert sorted(path.name for path in out.iterdir()) == ["data.html", "study.toml"]
     assert str(folder) in (out / "study.toml").read_text()
     assert not [path for path in folder.iterdir() if path.suffix != ".csv"]
-
-
-def test_a_look_at_data_keeps_a_study_and_a_page_of_somebody_that_are_there(tmp_path):
-    folder = tmp_path / "melt"
-    folder.mkdir()
-    out = tmp_path / "seen"
-    words = ["data", "show", str(sweeps(folder)), "--out", str(out)]
-    first = CliRunner().invoke(app, words)
-    again = CliRunner().invoke(app, words)  # of its own it makes new ones
-    assert first.output == again.output
+    assert look().output == shown.output  # of its own it makes new ones
     assert sorted(path.name for path in out.iterdir()) == ["data.html", "study.toml"]
-
     (out / "study.toml").write_text("changed by hand")
-    said = CliRunner().invoke(app, words)
+    said = look()
     assert said.exit_code == 0
     assert said.output.replace("\n", " ").count("is kept") == 1
     assert (out / "study.toml").read_text() == "changed by hand"
 
     (out / "data.html").write_text("written by hand")
-    refused = CliRunner().invoke(app, words)
+    refused = look()
     assert refused.exit_code == 2
     assert (out / "data.html").read_text() == "written by hand"
 
@@ -128,7 +122,7 @@ def test_an_import_ends_in_a_page_and_keeps_a_study_changed_by_hand(tmp_path):
     said = CliRunner().invoke(app, words)
     assert said.exit_code == 0, said.output
     page = (out / "data.html").read_text()
-    assert re.findall(r'<figure id="(\w+)"', page) == ["linear_sweep"]
+    assert drawn(page) == ["linear_sweep"]
     # what the block was taken for, and why, as the command itself says
     assert "frequency sweep" in said.output
     assert "frequency sweep" in page

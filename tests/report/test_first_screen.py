@@ -5,7 +5,7 @@ from dataclasses import replace
 from html import unescape
 
 import pytest
-from made_up_answer import MELT
+from made_up_answer import MELT, headline, page_of, screen_of
 from test_loop_report import loop_result
 
 from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
@@ -16,10 +16,7 @@ from discover.equations.parts import NamedPart, StatePart
 from discover.equations.spelling.markup import law_element
 from discover.equations.spelling.plain_signs import plain
 from discover.loop.answering import rest_of_h
-from discover.report.first_screen import answer_screen
-from discover.report.loop import write_loop
 from discover.report.page import render
-from discover.study import RunFolder
 from tensor_library.law_terms import LawTerm
 
 
@@ -35,7 +32,7 @@ def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate
     assert answer.adequate is adequate
     assert said in answer.headline
     assert any("worst run in range 8 % (a.csv)" in line for line in answer.lines) is not adequate
-    last = answer_screen(answer)["expected"][0].rows[-1]
+    last = screen_of(answer)["expected"][0].rows[-1]
     assert ((last.note, last.inside) == ("a.csv", "8 %")) is not adequate
     use = answer.to_json()["use"]
     assert use["expected_error"]["N1"] is None
@@ -56,19 +53,19 @@ def test_the_first_lines_have_at_most_sixty_words():
         suspects=(*MELT.suspects, Suspect("wall_slip")), failed="Not tested in transients.",
         next_test="Measure N1 at 3 1/s and 160 °C: equally good laws differ by 40 %.",
     )  # fmt: skip
-    assert count(answer_screen(long)) <= 60
+    assert count(screen_of(long)) <= 60
     assert "ε = 0.82" in long.headline
     assert "k b" not in long.headline
-    assert "k b" in replace(long, next_test="", suspects=(), failed="").headline
+    assert "k b" in headline(long, next_test="", suspects=(), failed="")
     # then what the table has, of a sum whose name is long
     sums = replace(
         long, title="empirical fit: linear PTT with strain damping, convective constraint release, "
         "added mode, Newtonian viscosity and tr(σ) σ·σ", law=None, failed="",
     )  # fmt: skip
-    assert count(answer_screen(sums)) <= 60
+    assert count(screen_of(sums)) <= 60
     assert "worst run" not in sums.headline
-    assert "worst run" in replace(sums, title="linear PTT", suspects=()).headline
-    screen = answer_screen(MELT)
+    assert "worst run" in headline(sums, title="linear PTT", suspects=())
+    screen = screen_of()
     assert count(screen) <= 60  # numbers are words too
     page = render("answer.html", screen=screen)
     order = ("Linear PTT", "Next:", "<math", "answer-table", 'id="modes"', "data-copy")
@@ -78,37 +75,23 @@ def test_the_first_lines_have_at_most_sixty_words():
     assert render("answer.html").strip() == ""  # a page without an answer
 
 
-def test_a_loop_page_begins_with_its_answer(tmp_path, no_pictures):
-    page = write_loop(loop_result(), RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+def test_a_loop_page_begins_with_its_answer_which_says_the_level_of_the_intervals_once(loop_page):
+    page = loop_page(loop_result())
     assert page.index('id="answer"') < page.index('id="verdict"')
 
 
 def test_the_level_of_the_intervals_of_constants_is_said_once():
     sums = Constant("consistency_Pa_sn", 4.0, (3.9, 4.1), "Pa sⁿ")
-    fluid = Answer(
-        "yield-stress fluid", "herschel_bulkley",
-        (Constant("yield_stress_Pa", 12.0, (11.9, 12.1), "Pa"), sums),
-    )  # fmt: skip
+    yields = Constant("yield_stress_Pa", 12.0, (11.9, 12.1), "Pa")
+    fluid = Answer("yield-stress fluid", "herschel_bulkley", (yields, sums))
     assert fluid.headline.count("95 %") == 1
     assert "K = 4.00 Pa sⁿ (3.90–4.10)" in fluid.headline
     declared = replace(fluid, constants=(Constant("alpha", 0.2), sums))
     # α has no interval that could say it
     assert declared.headline.count("(95 % CI 3.90–4.10)") == 1
-    screen = answer_screen(MELT)
+    screen = screen_of()
     said = " ".join([screen["headline"], screen["quality"], screen["behind"]])
     assert said.count("(95") == 2  # of the constants and of the mean error
-
-
-def test_a_law_that_cannot_be_written_out_leaves_the_best_classical_one_to_copy():
-    law, classical = Equation((LawTerm("tr(sigma)*sigma", 0.82),)), MELT.equation
-    answer = replace(MELT, equation=None, shown=law, classical=classical)
-    screen = answer_screen(answer)
-    assert "0.82" in screen["law"]
-    assert screen["copied"] == "Copy the best classical law as"
-    assert all(one["text"] for one in screen["copies"])
-    bare = answer_screen(replace(answer, classical=None))
-    assert bare["copied"] == "Copy as"
-    assert not any(one["text"] for one in bare["copies"] if one["name"] != "JSON")
 
 
 def test_rows_have_the_letters_of_the_equation_and_say_what_they_are():
@@ -117,13 +100,10 @@ def test_rows_have_the_letters_of_the_equation_and_say_what_they_are():
             equation = plain(effect.equation)
             for one in effect.parameters:
                 assert plain(one.symbol).removeprefix("1/") in equation, one.name
-    time = Constant(
-        "heat_loss_time", 160.0, (110.0, 230.0), "s", True, r"t_\mathrm{h}", "heat loss"
-    )
-    page = render("answer.html", screen=answer_screen(replace(MELT, constants=(time,))))
-    assert 't<sub>h</sub> <span class="note">heat loss</span>' in page
-    run = answer_screen(replace(MELT, failed="Missed in run a_1b <x>."))
-    assert "run a_1b &lt;x&gt;." in render("answer.html", screen=run)
+    said = r"t_\mathrm{h}", "heat loss"
+    time = Constant("heat_loss_time", 160.0, (110.0, 230.0), "s", True, *said)
+    assert 't<sub>h</sub> <span class="note">heat loss</span>' in page_of(constants=(time,))
+    assert "run a_1b &lt;x&gt;." in page_of(failed="Missed in run a_1b <x>.")
 
 
 def test_what_cannot_be_written_out_is_one_equation_with_the_law_it_is_added_to():
@@ -136,47 +116,49 @@ def test_what_cannot_be_written_out_is_one_equation_with_the_law_it_is_added_to(
     assert len(where) == 1
     law = Equation((LawTerm("sigma.sigma", 0.1),), (2.0, 1.0), (1.0, 10.0))
     answer = replace(MELT, equation=None, shown=law, written={"formula": rest_of_h(added)})
-    assert "<mi>h</mi>" in answer_screen(answer)["law"]
-    assert "<mi>h</mi>" not in answer_screen(replace(answer, written={}))["law"]
+    assert "<mi>h</mi>" in screen_of(answer)["law"]
+    assert "<mi>h</mi>" not in screen_of(answer, written={})["law"]
 
 
 def test_a_suspect_is_a_row_of_the_table_with_its_interval():
-    (row,) = answer_screen(MELT)["suspects"]
+    (row,) = screen_of()["suspects"]
     assert row[:2] == ("stress gain", "may be zero")
     assert row[2].startswith("−11")
     assert row[3] == "−36\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}2"
-    two = replace(MELT, suspects=(*MELT.suspects, Suspect("wall_slip")))
-    rows = answer_screen(two)["suspects"]
+    rows = screen_of(suspects=(*MELT.suspects, Suspect("wall_slip")))["suspects"]
     assert [one[2] for one in rows] == ["sizes not separable"] * 2
-    page = render("answer.html", screen=answer_screen(MELT))
-    heading = page.index("not part of the law")
-    assert (
-        page.index("<th>constant (fitted in shear)</th>") < heading < page.rindex("<td>stress gain")
-    )
-    assert "not part of the law" not in render(
-        "answer.html", screen=answer_screen(replace(MELT, suspects=()))
-    )
+    page, heading = page_of(), "not part of the law"
+    before = page.index("<th>constant (fitted in shear)</th>")
+    assert before < page.index(heading) < page.rindex("<td>stress gain")
+    assert heading not in page_of(suspects=())
 
 
-def test_an_equation_has_the_digits_of_its_intervals_and_three_at_most():
+def test_equation_table_and_modes_have_the_digits_of_the_intervals_and_three_at_most():
     terms = LawTerm("tr(sigma)*sigma", 0.81734), LawTerm("sigma.sigma", 0.12345)
-    law = replace(MELT.equation, terms=terms)
     wide = Constant("epsilon", 0.81734, (0.58, 1.07))
-    shown = answer_screen(replace(MELT, equation=law, constants=(wide,)))["law"]
+    shown = screen_of(equation=replace(MELT.equation, terms=terms), constants=(wide,))["law"]
     assert "<mn>0.82</mn>" in shown
     assert "<mn>0.123</mn>" in shown
+    # one that is not determined has the value that the equation has
+    factor = Constant("modulus_factor", 0.013917, (4.5e-5, 455.0), determined=False)
+    (row,) = screen_of(constants=(factor,))["constants"]
+    assert row[2:4] == ("0.014", "not determined alone")  # words may break, numbers not
+    assert "0.014" not in factor.text
+    modulus = Constant("modulus_Pa", 2.0543, (1.028, 3.8504), "Pa")
+    page = page_of(law=None, constants=(modulus,), modes=(Mode(2.0543, 0.82),))
+    assert modulus.number == "2.1 Pa"
+    assert "<td>2.1</td><td>0.82</td>" in page
+    assert "mode (fitted): G\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}2.1\N{NO-BREAK SPACE}" in page
 
 
 def test_numbers_without_units_say_what_they_are():
-    plain = replace(
-        MELT, modes=(Mode(1.0, 1.0),), fits_to_the_noise=True, discrepancy=None,
+    page = page_of(
+        modes=(Mode(1.0, 1.0),), fits_to_the_noise=True, discrepancy=None,
         range=Range((1.0, 2.0), (0.25, 1.0)),
     )  # fmt: skip
-    page = render("answer.html", screen=answer_screen(plain))
     assert '<abbr title="Weissenberg number:' in page
     assert '<abbr title="Deborah number:' in page
-    unseen = render("answer.html", screen=answer_screen(MELT))
-    assert 'left out in turn">unseen runs</abbr>' in unseen
+    assert 'left out in turn">unseen runs</abbr>' in page_of()
 
 
 def test_a_residual_of_fitted_runs_is_no_expected_error():
@@ -186,10 +168,10 @@ def test_a_residual_of_fitted_runs_is_no_expected_error():
         expected_error={"sigma12": ExpectedError(0.06, is_residual=True)},
     )
     assert "Residual of the fitted runs 6 %, corrected for" in fitted.headline
-    page = render("answer.html", screen=answer_screen(fitted))
+    page = page_of(fitted)
     assert "<th>residual of the fitted runs (noise 0.25\N{NO-BREAK SPACE}%)</th>" in page
     assert not any("Error on unseen" in line for line in fitted.lines)
-    page = render("answer.html", screen=answer_screen(MELT))
+    page = page_of()
     assert "<th>error on unseen runs above noise (0.25\N{NO-BREAK SPACE}%)</th>" in page
     # what the verdict calls noise has no size
     flow_curve = replace(fitted, fits_to_the_noise=True, range=Range(steady=True))
@@ -208,10 +190,10 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
     assert "Use for σ12, 0.003–3 1/s: within 5 % up to 0.3 1/s; up to 9 % off above." in (
         one_range.headline
     )
-    assert answer_screen(several)["expected"][0].rows[-1].note == "b"
+    assert screen_of(several)["expected"][0].rows[-1].note == "b"
     by_law = ExpectedError(0.15, note="by law", is_measured=False, spread=(0.15, 0.2))
     pulled = {**MELT.expected_error, "N1": by_law, "uniaxial": ExpectedError(0.05)}
-    screen = answer_screen(replace(several, expected_error=pulled))
+    screen = screen_of(several, expected_error=pulled)
     measured, untested = ({one.symbol: one for one in e.rows} for e in screen["expected"])
     assert measured["σ12"].note == "2 unseen runs, above tolerance"
     assert measured["uniaxial extension"].note == ""
@@ -225,26 +207,18 @@ def test_constants_far_from_the_middle_of_their_intervals_are_a_set():
     skewed, even = Constant("epsilon", 0.80, (0.17, 0.82)), Constant("alpha", 0.2, (0.1, 0.3))
     note = "best&nbsp;fit: use these<br>values together</th><th>95 % CI over all<br>laws that fit"
     pair = replace(MELT, constants=(skewed, even))
-    assert note in render("answer.html", screen=answer_screen(pair))
-    assert note not in render("answer.html", screen=answer_screen(replace(pair, constants=(even,))))
+    assert note in page_of(pair)
+    assert note not in page_of(replace(pair, constants=(even,)))
     one = replace(pair, constants=(even,))  # which holds only if its law is the right one
     condition = "95 % CI<br>within this law</th>"
-    assert condition in render("answer.html", screen=answer_screen(one))
+    assert condition in page_of(one)
     right = replace(one, fits_to_the_noise=True)
-    assert condition not in render("answer.html", screen=answer_screen(right))
+    assert condition not in page_of(right)
     alone = replace(pair, constants=(skewed, Constant("alpha", 0.2)))  # the other was declared
-    assert note not in render("answer.html", screen=answer_screen(alone))
+    assert note not in page_of(alone)
     bound = Constant("heating", 1e-6, (5e-7, 1e-6), "1/Pa", meaning="heat", end="high")
-    (row, _) = answer_screen(replace(pair, constants=(bound, even)))["constants"]
+    (row, _) = screen_of(pair, constants=(bound, even))["constants"]
     assert row[1] == "heat; at its physical limit"
-
-
-def test_a_constant_that_is_not_determined_has_the_value_that_the_equation_has():
-    factor = Constant("modulus_factor", 0.013917, (4.5e-5, 455.0), determined=False)
-    (row,) = answer_screen(replace(MELT, constants=(factor,)))["constants"]
-    assert row[2] == "0.014"
-    assert row[3] == "not determined alone"  # words may break, numbers not
-    assert "0.014" not in factor.text
 
 
 def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_modes():
@@ -255,36 +229,34 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
         "(a_T = 0.00762), divide by 14.8 for −23 °C (a_T = 0.0677)."
     ) in shifted.lines
     assert "0.003–3 1/s reduced to −35 °C." in shifted.headline
-    screen = answer_screen(shifted)
+    screen = screen_of(shifted)
     # 0.003–3 1/s times 131 and times 14.8
     assert screen["shifts"] == [("−10 °C", "0.00762", "0.39–390"), ("−23 °C", "0.0677", "0.044–44")]
     assert "modes (given) at −35 °C: G" in render("answer.html", screen=screen)
     hot = replace(shifted, range=replace(MELT.range, by_temperature={-10.0: MELT.range}))
-    told = answer_screen(hot)["fitted"]
+    told = screen_of(hot)["fitted"]
     assert told == (" (fitted in shear at −10 °C; times are for −35 °C: divide by 131 for −10 °C)")
     cold = replace(shifted, shift_factors={-50.0: 20.0})
     assert any("times: multiply by 20 for −50 °C" in line for line in cold.lines)
     clock = "times on the instrument's clock"  # which is not shifted
     assert clock not in screen["suspected"]  # a gain has no time
     lag = Suspect("transducer_lag", (Constant("tau", 0.35, (0.13, 0.48), "s"),))
-    assert clock in answer_screen(replace(shifted, suspects=(lag,)))["suspected"]
+    assert clock in screen_of(shifted, suspects=(lag,))["suspected"]
     assert shifted.use["shift_factors"]["-10"] == pytest.approx(1.0 / 131.234)
-    page = render("answer.html", screen=answer_screen(replace(MELT, temperature_C=-35.0)))
+    page = page_of(replace(MELT, temperature_C=-35.0))
     assert "divide by" not in page
 
 
 def test_two_structures_scale_relaxation_times_by_one_product():
     def part(name):
-        return StatePart(
-            name, {one.name: one.first_trial for one in named_effects()[name].parameters}
-        )
+        constants = {one.name: one.first_trial for one in named_effects()[name].parameters}
+        return StatePart(name, constants)
 
-    parts = list(
-        map(part, ("thixotropic_relaxation_by_stress", "thixotropic_relaxation_two_times"))
-    )
+    names = ("thixotropic_relaxation_by_stress", "thixotropic_relaxation_two_times")
+    parts = [part(name) for name in names]
 
     def products(*states):
-        shown = answer_screen(replace(MELT, equation=replace(MELT.equation, states=states)))["law"]
+        shown = screen_of(equation=replace(MELT.equation, states=states))["law"]
         return [unescape(one) for one in re.findall(r'aria-label="([^"]*multiplied[^"]*)"', shown)]
 
     assert products(*parts) == ["λ_k is multiplied by s [(1 - w) q_1 + w q_2]"]
@@ -297,80 +269,76 @@ def test_two_structures_scale_relaxation_times_by_one_product():
 @pytest.mark.parametrize(("count", "shown"), [(1, True), (3, True), (4, False), (10, False)])
 def test_three_modes_are_listed_and_more_are_folded(count, shown):
     modes = tuple(Mode(1000.0 / 2**k, 10.0**k) for k in range(count))
-    page = render("answer.html", screen=answer_screen(replace(MELT, modes=modes)))
+    page = page_of(modes=modes)
     assert ('<details id="modes" open>' in page) is shown
     assert ("G\N{NO-BREAK SPACE}=" in page[: page.index("</summary>")]) is (count == 1)
 
 
 def test_modes_stand_in_the_order_of_their_times():
-    melt = replace(MELT, modes=(Mode(5.0, 3.0), Mode(6.0, 1.0), Mode(4.0, 2.0)))
-    page = render("answer.html", screen=answer_screen(melt))
+    page = page_of(modes=(Mode(5.0, 3.0), Mode(6.0, 1.0), Mode(4.0, 2.0)))
     assert re.findall(r"<tr><td>\d</td><td>.*?</td><td>(.*?)</td>", page) == ["1", "2", "3"]
     assert "G from 4\N{NO-BREAK SPACE}Pa to 6" in page
 
 
-def test_a_constant_has_the_same_digits_wherever_it_stands():
-    modulus = Constant("modulus_Pa", 2.0543, (1.028, 3.8504), "Pa")
-    fluid = replace(MELT, law=None, constants=(modulus,), modes=(Mode(2.0543, 0.82),))
-    page = render("answer.html", screen=answer_screen(fluid))
-    assert modulus.number == "2.1 Pa"
-    assert "<td>2.1</td><td>0.82</td>" in page
-    assert "mode (fitted): G\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}2.1\N{NO-BREAK SPACE}" in page
-
-
 def test_rates_in_prose_and_tables_cannot_be_read_as_numbers():
     fast = ExpectedError(0.06, 0.18, "measured at 3 1/s")
-    page = render("answer.html", screen=answer_screen(
-        replace(MELT, expected_error={"sigma12": fast}, next_test="Measure N1 at 3 1/s.")
-    ))  # fmt: skip
+    page = page_of(expected_error={"sigma12": fast}, next_test="Measure N1 at 3 1/s.")  # fmt: skip
     shown = page[: page.index('<p class="copies">')]
     assert "1/s" not in shown
     assert shown.count("3\N{NARROW NO-BREAK SPACE}s⁻¹") == 3
-    assert "3 1/s" in replace(MELT, expected_error={"sigma12": fast}).headline  # a terminal
+    assert "3 1/s" in headline(expected_error={"sigma12": fast})  # a terminal
 
 
-def test_a_law_of_one_mode_is_written_in_units_whatever_its_values():
+def test_a_law_of_one_mode_is_written_in_units_and_a_constant_of_each_mode_has_its_index():
     law = Equation((LawTerm("sigma.sigma", 0.2),))
-    written = answer_screen(replace(MELT, equation=law, modes=(Mode(1.0, 1.0),)))["law"]
+    written = screen_of(equation=law, modes=(Mode(1.0, 1.0),))["law"]
     assert r'alttext="\lambda ' in written
     assert "<mi>G</mi>" in written
+    each = tuple({"epsilon": value} for value in (0.2, 0.5))
+    assert "ε_{k}" in law_element((), True, NamedPart("ptt_linear", each), modes=2)
+    assert "ε_" not in law_element((), True, NamedPart("ptt_linear", each[:1]), modes=2)
 
 
 def test_quantities_that_nothing_is_known_of_share_a_row():
     none = ExpectedError()
     fluid = replace(MELT, expected_error={"sigma12": ExpectedError(0.01), "N1": none, "N2": none})
-    rows = [row for one in answer_screen(fluid)["expected"] for row in one.rows]
-    assert [one.symbol for one in rows if one.note != "a.csv"] == [
-        "σ12", "N1, N2, uniaxial extension",
-    ]  # fmt: skip
-    page = render("answer.html", screen=answer_screen(fluid))
+    rows = [row for one in screen_of(fluid)["expected"] for row in one.rows]
+    told = [one.symbol for one in rows if one.note != "a.csv"]
+    assert told == ["σ12", "N1, N2, uniaxial extension"]
+    page = page_of(fluid)
     table = page[page.index('<table id="answer-table">') : page.index("</table>")]
     assert table.count('class="both">not measured') == 1
     apart = {"N1": replace(none, note="0 by this law"), "N2": none}  # for reasons of their own
-    assert len(answer_screen(replace(fluid, expected_error=apart))["expected"][1].rows) == 3
+    assert len(screen_of(fluid, expected_error=apart)["expected"][1].rows) == 3
 
 
-def test_a_grey_button_says_why():
-    answer = replace(MELT, equation=None)
-    page = render("answer.html", screen=answer_screen(answer))
-    assert "Cannot be exported to rheoTool, Python and LaTeX: it cannot be written out." in page
-    assert "Cannot be exported" not in render("answer.html", screen=answer_screen(MELT))
+def test_a_law_that_cannot_be_written_out_says_so_and_leaves_the_best_classical_one_to_copy():
+    said = "Cannot be exported to rheoTool, Python and LaTeX: it cannot be written out."
+    assert said in page_of(equation=None)
+    assert "Cannot be exported" not in page_of()
+    law, classical = Equation((LawTerm("tr(sigma)*sigma", 0.82),)), MELT.equation
+    answer = replace(MELT, equation=None, shown=law, classical=classical)
+    screen = screen_of(answer)
+    assert "0.82" in screen["law"]
+    assert screen["copied"] == "Copy the best classical law as"
+    assert all(one["text"] for one in screen["copies"])
+    bare = screen_of(answer, classical=None)
+    assert bare["copied"] == "Copy as"
+    assert not any(one["text"] for one in bare["copies"] if one["name"] != "JSON")
 
 
 def test_numbers_chances_and_levels_keep_to_a_line_with_their_units():
-    assert "<td>6\N{NO-BREAK SPACE}%</td>" in render("answer.html", screen=answer_screen(MELT))
-    exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
-    (row,) = answer_screen(exact)["constants"]
+    assert "<td>6\N{NO-BREAK SPACE}%</td>" in page_of()
+    (row,) = screen_of(constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))["constants"]
     assert row[2].split(" ") == ["2\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10⁻⁷", row[2][-4:]]
-    noted = replace(MELT, discrepancy=replace(MELT.discrepancy, by_run={"a_b1p0.csv": 0.08}))
-    assert "a_<wbr>b1p0.csv" in render("answer.html", screen=answer_screen(noted))
-    assert "ε\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.82" in answer_screen(MELT)["headline"]
-    gap, said = "\N{NO-BREAK SPACE}", replace(MELT, failed="No law reaches the noise (p < 0.001).")
-    assert f"(p{gap}<{gap}0.001)" in answer_screen(said)["quality"]
-    assert f"(95{gap}%{gap}CI{gap}0.58" in answer_screen(said)["headline"]
+    named = replace(MELT.discrepancy, by_run={"a_b1p0.csv": 0.08})
+    assert "a_<wbr>b1p0.csv" in page_of(discrepancy=named)
+    gap, screen = "\N{NO-BREAK SPACE}", screen_of(failed="No law reaches the noise (p < 0.001).")
+    assert f"(p{gap}<{gap}0.001)" in screen["quality"]
+    assert f"ε{gap}={gap}0.82 (95{gap}%{gap}CI{gap}0.58" in screen["headline"]
 
 
-def test_the_interval_comes_first_where_the_best_fit_is_near_its_end():
+def test_the_interval_comes_first_near_an_end_and_what_was_not_tested_behind_the_fit():
     skewed = Constant("epsilon", 0.80, (0.37, 0.82))
     assert skewed.text == "ε = 0.37–0.82 (95 % CI, best fit 0.80)"
     answer = replace(MELT, constants=(skewed, Constant("alpha", 0.2, (0.2, 0.4))))
@@ -378,22 +346,9 @@ def test_the_interval_comes_first_where_the_best_fit_is_near_its_end():
         "Linear PTT, ε = 0.37–0.82 (95 % CI, best fit 0.80), α = 0.20–0.40 (best fit 0.20), 2 "
     )
     # the table gives the value that the equation has, for it goes with the other constants
-    assert answer_screen(answer)["constants"][0][2] == "0.80"
+    assert screen_of(answer)["constants"][0][2] == "0.80"
     assert Constant("epsilon", 0.4, (0.17, 0.82)).text == "ε = 0.40 (95 % CI 0.17–0.82)"
-
-
-def test_what_was_not_tested_stands_behind_the_fit():
-    fitted = replace(
-        MELT, fits_to_the_noise=True, failed="Not tested on unseen runs.", tolerance=0.1
-    )
-    screen = answer_screen(fitted)
-    assert "Not tested on unseen runs. Use for" in screen["quality"]
+    told = "Not tested on unseen runs."
+    screen = screen_of(fits_to_the_noise=True, failed=told, tolerance=0.1)
+    assert f"{told} Use for" in screen["quality"]
     assert "Not tested" not in screen["behind"]
-
-
-def test_a_constant_of_each_mode_has_its_index():
-    each = tuple({"epsilon": value} for value in (0.2, 0.5))
-    law = law_element((), True, NamedPart("ptt_linear", each), modes=2)
-    assert "ε_{k}" in law
-    one = law_element((), True, NamedPart("ptt_linear", each[:1]), modes=2)
-    assert "ε_" not in one

@@ -10,13 +10,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from discover.report.mathtext import formula
-from discover.report.plots.style import (
-    figure,
-    last_cycle,
-    legend_above,
-    picture,
-    runs_through_decades,
-)
+from discover.report.plots import style
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -39,10 +33,10 @@ LOUD = "lines.linewidth: 13\naxes.facecolor: red\nfont.size: 30\ntext.usetex: Tr
 
 
 def drawn():
-    with figure(1, 1) as (drawing, axes):
+    with style.figure(1, 1) as (drawing, axes):
         axes[0, 0].plot([1, 2, 3], label="a")
         axes[0, 0].legend()
-        svg = picture(drawing, "a", "b").svg
+        svg = style.picture(drawing, "a", "b").svg
     return svg, formula(r"\lambda\dot\gamma", "f")
 
 
@@ -85,15 +79,15 @@ TIMES = np.linspace(0.0, 31.4, 1001)
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_the_last_cycle_is_one_period_long(noise):
     rate = 2.0 * np.cos(1.5 * TIMES) + noise * np.random.default_rng(0).standard_normal(TIMES.size)
-    last = last_cycle(TIMES, rate)
+    last = style.last_cycle(TIMES, rate)
     period = 2.0 * np.pi / 1.5
     assert np.ptp(TIMES[last]) == pytest.approx(1.02 * period, rel=0.03)
     assert last[-1]
 
 
 def test_a_start_up_and_noisy_steps_have_no_cycle():
-    assert last_cycle(TIMES, np.full(TIMES.size, 2.0)) is None
-    assert last_cycle(TIMES, np.random.default_rng(0).standard_normal(TIMES.size)) is None
+    assert style.last_cycle(TIMES, np.full(TIMES.size, 2.0)) is None
+    assert style.last_cycle(TIMES, np.random.default_rng(0).standard_normal(TIMES.size)) is None
 
 
 SHORT = ["data", "sparse", "network", "dense"]
@@ -108,10 +102,10 @@ LONG = [
 
 def drawn_legend(labels):
     """The legend's extent and the figure's, in pixels, as matplotlib lays them out."""
-    with figure(1, 3) as (drawing, axes):
+    with style.figure(1, 3) as (drawing, axes):
         for label in labels:
             axes[0, 0].plot([0.0, 1.0], label=label)
-        legend_above(drawing, axes)
+        style.legend_above(drawing, axes)
         FigureCanvasAgg(drawing).draw()
         return drawing.legends[0].get_window_extent(), drawing.bbox
 
@@ -130,14 +124,11 @@ def test_what_fits_stands_in_one_row_and_what_does_not_in_two():
 DECADES = np.geomspace(1e-3, 60.0, 65)
 
 
-def test_a_step_whose_measured_rate_rises_is_drawn_through_decades_as_a_start_up_is():
-    assert runs_through_decades(DECADES, np.full(65, 10.0))
-    assert runs_through_decades(DECADES, 10.0 * (1.0 - np.exp(-DECADES / 2e-3)))
-
-
-def test_even_samples_of_a_rate_that_changes_are_drawn_in_plain_time():
+def test_steps_whose_rate_rises_are_drawn_through_decades_as_start_ups_and_even_samples_in_time():
+    assert style.runs_through_decades(DECADES, np.full(65, 10.0))
+    assert style.runs_through_decades(DECADES, 10.0 * (1.0 - np.exp(-DECADES / 2e-3)))
     even = np.linspace(0.0, 60.0, 601)
-    assert not runs_through_decades(even, np.cos(even))
-    assert not runs_through_decades(even, 10.0 * (1.0 - np.exp(-even)))
+    assert not style.runs_through_decades(even, np.cos(even))
+    assert not style.runs_through_decades(even, 10.0 * (1.0 - np.exp(-even)))
     # and so is what lasts no decade and a half
-    assert not runs_through_decades(np.geomspace(1.0, 20.0, 50), np.full(50, 1.0))
+    assert not style.runs_through_decades(np.geomspace(1.0, 20.0, 50), np.full(50, 1.0))

@@ -43,10 +43,7 @@ def comparison():
     study = parse_study(
         {
             "data": {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 21}},
-            "compare": {
-                "high_deborah": [1.5],
-                "library": {"degree": 0},
-            },
+            "compare": {"high_deborah": [1.5], "library": {"degree": 0}},
         }
     )
     with pytest.MonkeyPatch.context() as patch:
@@ -65,13 +62,6 @@ def folder(comparison, tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(folder):
     return (folder / "report.html").read_text("utf-8")
-
-
-def test_the_page_stands_alone_and_escapes_names(page):
-    assert stands_alone(page)
-    assert "&lt;script&gt;alert(1)" in page
-    assert "&lt;img src=x&gt;" in page
-    assert "<b>well</b>" not in page
 
 
 def test_json_is_the_contract(comparison):
@@ -101,31 +91,37 @@ def test_json_is_the_contract(comparison):
         assert {"terms", "errors_to_chosen", "separated_by"} <= set(rival)
 
 
-def test_a_page_that_needs_the_network_is_told_from_one_that_does_not():
-    # negative control of the check above
+def test_the_page_stands_alone_with_unique_identifiers_and_one_that_needs_the_network_is_told(page):
+    identifiers = re.findall(r'\bid="([^"]+)"', page)
+    assert len(identifiers) == len(set(identifiers))
+    references = re.findall(r"url\(#([^)]+)\)", page) + re.findall(r'href="#([^"]+)"', page)
+    assert set(references) <= set(identifiers)
+    assert stands_alone(page)
+    assert "&lt;script&gt;alert(1)" in page
+    assert "&lt;img src=x&gt;" in page
+    assert "<b>well</b>" not in page
+    # negative control of the check
     assert not stands_alone('<img src="https://example.org/a.png">')
     assert not stands_alone("<script>1</script>")
     assert stands_alone(f"<script>{SCRIPT}</script>")
     assert not stands_alone(f"<script>{SCRIPT} fetch('https://example.org')</script>")
 
 
-def test_identifiers_are_unique(page):
-    identifiers = re.findall(r'\bid="([^"]+)"', page)
-    assert len(identifiers) == len(set(identifiers))
-    references = re.findall(r"url\(#([^)]+)\)", page) + re.findall(r'href="#([^"]+)"', page)
-    assert set(references) <= set(identifiers)
-
-
-def test_the_page_has_the_papers_pictures_and_tables(page):
+def test_the_page_has_pictures_tables_and_the_run_that_made_it_once_at_its_foot(page):
     names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah")
     for name in (*names, "pipkin_error", "training"):
         assert f'<figure id="{name}">' in page
     for text in ("penalised", "debiased", "95 % interval", "σ₁₂", "N₂", "not determined"):
         assert text in page
     assert "prefers-color-scheme: dark" in page
+    assert page.count("a hash of the study") == 1
+    assert "Made by" not in page
+    made = page[page.index('<h2 id="made"') :]
+    assert "discover compare" in made
+    assert "jax " in made
 
 
-def test_every_picture_is_well_formed_and_names_every_curve(folder, page):
+def test_every_picture_is_well_formed_named_in_every_curve_and_has_a_text_alternative(folder, page):
     pictures = {file.stem: file.read_text("utf-8") for file in (folder / "figures").glob("*.svg")}
     assert len(pictures) >= 6
     for svg in pictures.values():
@@ -136,11 +132,21 @@ def test_every_picture_is_well_formed_and_names_every_curve(folder, page):
             assert label in pictures[name]
     for label in ("elastic Lissajous curve", "viscous Lissajous curve", "strain γ"):
         assert label in pictures["flow_laos_3_1.5"]
+    assert "<svg" in page
+    assert without_text(page) == []
+    assert without_text('<svg role="img" aria-label="">') != []  # negative control
 
 
-def test_pictures_are_the_same_bytes_every_time(comparison):
+def test_a_picture_is_the_same_bytes_every_time_and_follows_light_and_dark(comparison):
     first, second = (flow_picture(comparison, comparison.judged[0]).svg for _ in range(2))
     assert first == second
+    drawn = training_picture(comparison)
+    text = drawn.adaptive
+    ElementTree.fromstring(text.split("?>", 1)[1].split(">", 1)[1])
+    assert "prefers-color-scheme: dark" in text
+    assert "var(--sparse)" in text
+    assert SPARSE not in text.replace(style_sheet(), "")
+    assert SPARSE in drawn.svg  # for programs that know no variables
 
 
 def test_a_curve_that_ran_away_is_left_out(comparison):
@@ -192,30 +198,10 @@ def test_the_pipkin_map_of_error_holds_the_errors_of_the_result(comparison):
     }
 
 
-def test_strain_is_the_integral_of_the_rate(comparison):
-    flow = next(f for f in comparison.flows_of("training") if f.name == "laos_2_0.5")
-    wanted = 2.0 / 0.5 * np.sin(0.5 * flow.times)
-    np.testing.assert_allclose(flow.strain, wanted, atol=2e-2)  # 21 samples
-
-
 def without_text(page):
     """Pictures of a page that say nothing to those who do not see them."""
     pictures = re.findall(r"<(?:svg|img)\b[^>]*>", page)
     return [p for p in pictures if not re.search(r'(?:aria-label|alt)="[^"]+"', p)]
-
-
-def test_every_picture_has_a_text_alternative(page):
-    assert "<svg" in page
-    assert without_text(page) == []
-    assert without_text('<svg role="img" aria-label="">') != []  # negative control
-
-
-def test_the_run_that_made_a_page_stands_once_at_its_foot(page):
-    assert page.count("a hash of the study") == 1
-    assert "Made by" not in page
-    made = page[page.index('<h2 id="made"') :]
-    assert "discover compare" in made
-    assert "jax " in made
 
 
 def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, page):
@@ -236,30 +222,22 @@ def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, pa
     assert widths[5] is None  # N2 is not determined
 
 
-def test_a_picture_by_itself_follows_light_and_dark(comparison):
-    drawn = training_picture(comparison)
-    text = drawn.adaptive
-    ElementTree.fromstring(text.split("?>", 1)[1].split(">", 1)[1])
-    assert "prefers-color-scheme: dark" in text
-    assert "var(--sparse)" in text
-    assert SPARSE not in text.replace(style_sheet(), "")
-    assert SPARSE in drawn.svg  # for programs that know no variables
-
-
-def test_the_script_of_the_readme_draws_what_the_comparison_says(comparison):
+def test_the_script_of_the_readme_draws_what_is_said_and_strain_is_the_integral_of_the_rate(
+    comparison,
+):
     script = Path(__file__).parents[2] / "docs" / "picture.py"
     drawn = runpy.run_path(str(script))["draw"](comparison)
     assert drawn.name == "lissajous"
     assert {"truth", "sparse regression", "neural network"} <= set(texts_of(drawn.svg))
+    flow = next(f for f in comparison.flows_of("training") if f.name == "laos_2_0.5")
+    wanted = 2.0 / 0.5 * np.sin(0.5 * flow.times)
+    np.testing.assert_allclose(flow.strain, wanted, atol=2e-2)  # 21 samples
 
 
-def test_an_ellipse_has_no_third_harmonic_and_a_distorted_wave_has():
+def test_an_ellipse_has_no_third_harmonic_and_file_names_stay_in_the_folder():
     phase = np.linspace(0.0, 2.0 * np.pi, 121)
     assert third_harmonic(np.cos(phase + 0.3)) < 1e-12
     assert third_harmonic(np.cos(phase) + 0.1 * np.cos(3 * phase)) == pytest.approx(0.1)
-
-
-def test_file_names_stay_in_the_folder():
     assert "/" not in safe_name("../../etc/passwd")
     assert safe_name("flow_laos_3_1.5") == "flow_laos_3_1.5"
 

@@ -58,9 +58,14 @@ def test_axes_of_per_cents_have_plain_numbers_and_more_of_them_where_they_are_sh
     assert "20" not in long
 
 
-def test_a_formula_that_cannot_be_set_is_shown_as_text():
+def test_a_formula_is_read_aloud_as_it_is_written_and_one_that_cannot_be_set_is_text():
     assert formula(r"\alpha\,\sigma", "a").startswith("<svg")
     assert formula(r"\nonsense{<b>}", "b") == "<code>nonsense&lt;b&gt;</code>"
+    assert plain(r"\sigma \mathrel{+}= \frac{Y}{t_\mathrm{b}}\,\dot\gamma") == "σ += Y/(t_b) γ̇"
+    assert (
+        plain(r"h - (e^{\varepsilon\,\mathrm{tr}\,\boldsymbol{\sigma}} - 1)")
+        == "h - (e^(ε tr σ) - 1)"
+    )
 
 
 @pytest.mark.parametrize(
@@ -78,14 +83,6 @@ def test_every_effect_is_set_as_a_formula_and_no_latex_is_left_of_it(effect):
         assert drawn.startswith("<svg")
         assert "\\" not in drawn
         assert not set(plain(latex)) & set("\\{}$")
-
-
-def test_a_formula_is_read_aloud_as_it_is_written():
-    assert plain(r"\sigma \mathrel{+}= \frac{Y}{t_\mathrm{b}}\,\dot\gamma") == "σ += Y/(t_b) γ̇"
-    assert (
-        plain(r"h - (e^{\varepsilon\,\mathrm{tr}\,\boldsymbol{\sigma}} - 1)")
-        == "h - (e^(ε tr σ) - 1)"
-    )
 
 
 @pytest.mark.parametrize(

@@ -10,19 +10,11 @@ from independent.sweeps import strain_at
 from scipy.optimize import brentq
 from vectors import sweep_of, vector_of
 
+from discover import protocols
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flows import PeriodicFlows
-from discover.protocols import (
-    after_alternation,
-    after_step_strain,
-    imposed_stress,
-    in_flow,
-    oscillatory_shear,
-    start_up,
-    steady_rates,
-)
 
 MODULUS, TIME = 100.0, 1.0
 TIMES = np.geomspace(0.01, 10.0, 60)
@@ -42,12 +34,12 @@ MAXWELL = giesekus(0.0)
 def flow_curve(rates, stress=None, **columns):
     stress = np.ones(len(rates)) if stress is None else stress
     times = np.arange(1.0, len(rates) + 1.0)
-    return Run("flow_curve.csv", times, steady_rates(rates), rates, stress, **columns)
+    return Run("flow_curve.csv", times, protocols.steady_rates(rates), rates, stress, **columns)
 
 
 def at_stress(times, stress, strain=None):
     strain = np.ones(len(times)) if strain is None else strain
-    protocol = imposed_stress(times, stress)
+    protocol = protocols.imposed_stress(times, stress)
     return Run("creep", times, protocol, np.zeros(len(times)), stress, strain=strain)
 
 
@@ -70,14 +62,6 @@ def test_what_needs_time_or_strain_does_not_act_on_steady_states():
     np.testing.assert_allclose(gained[0], 1.1 * plain[0], rtol=1e-12)
 
 
-def test_a_maxwell_fluid_recovers_its_elastic_strain():
-    times = np.concatenate([np.linspace(0.05, 2.0, 40), 2.0 + np.geomspace(0.01, 3.0, 40)])
-    stress = np.where(times <= 2.0, 50.0, 0.0)
-    strain = predicted(MAXWELL, at_stress(times, stress))[0]
-    flowed = 50.0 / MODULUS * 2.0 / TIME
-    np.testing.assert_allclose(strain[times > 2.0], flowed, rtol=1e-4)
-
-
 # second order in time: 7e-6 was measured where the solvent carries most of the stress
 @pytest.mark.parametrize("solvent", [0.1, 10.0])
 def test_a_giesekus_fluid_with_solvent_creeps_as_scipy_has_it(solvent):
@@ -96,12 +80,8 @@ def test_a_spectrum_over_five_decades_creeps_by_its_closed_form():
         return np.sum(modulus * time / (1.0 + time * s))
 
     rates = 1.0 / time
-    zeros = np.array(
-        [
-            brentq(relaxing, -a * (1.0 - 1e-12), -b * (1.0 + 1e-12), xtol=1e-300, rtol=1e-14)
-            for a, b in pairwise(rates)
-        ]
-    )
+    ends = [(-a * (1.0 - 1e-12), -b * (1.0 + 1e-12)) for a, b in pairwise(rates)]
+    zeros = np.array([brentq(relaxing, *end, xtol=1e-300, rtol=1e-14) for end in ends])
     slopes = np.array([np.sum(modulus * time**2 / (1.0 + time * s) ** 2) for s in zeros])
     parts = 1.0 / (zeros**2 * slopes)
     compliance = 1.0 / np.sum(modulus) + times / np.sum(modulus * time)
@@ -115,12 +95,13 @@ def test_a_spectrum_over_five_decades_creeps_by_its_closed_form():
 
 def test_runs_of_every_kind_are_predicted_together_as_each_alone():
     rates, ones = np.geomspace(0.1, 10.0, 9), np.ones(60)
-    strains, wave = np.array([0.1, 1.0, 10.0]), oscillatory_shear(1.0, 1.0)
-    swing = after_alternation(wave, 2.0 * np.pi, TIMES)
+    strains, wave = np.array([0.1, 1.0, 10.0]), protocols.oscillatory_shear(1.0, 1.0)
+    swing = protocols.after_alternation(wave, 2.0 * np.pi, TIMES)
     storage, loss = sweep_of(strains, np.ones(3)).records
     flows = {
-        "start": start_up(2.0), "stretched": in_flow(start_up(0.6), "uniaxial"), "swing": swing,
-        "step": after_step_strain(start_up(0.0), 2.0, first=float(TIMES[0])),
+        "start": protocols.start_up(2.0), "swing": swing,
+        "stretched": protocols.in_flow(protocols.start_up(0.6), "uniaxial"),
+        "step": protocols.after_step_strain(protocols.start_up(0.0), 2.0, first=float(TIMES[0])),
     }  # fmt: skip
     in_time = [Run(name, TIMES, flow, ones, ones) for name, flow in flows.items()]
     creep = at_stress(TIMES[:50], np.full(50, 30.0))
@@ -136,9 +117,7 @@ def test_runs_of_every_kind_are_predicted_together_as_each_alone():
 
 
 def test_a_protocol_of_samples_that_impose_no_rate_is_not_smoothed():
-    from discover.protocols import another_between_samples
-
     run = at_stress(TIMES, 5.0 * np.sin(TIMES))
-    assert another_between_samples(run.protocol, run.time) is None
-    rates = replace(run, protocol=start_up(1.0)).protocol
+    assert protocols.another_between_samples(run.protocol, run.time) is None
+    rates = replace(run, protocol=protocols.start_up(1.0)).protocol
     assert rates.control == "rate"

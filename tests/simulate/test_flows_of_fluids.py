@@ -14,12 +14,7 @@ from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import dynamics_of_fluid, observed_on_grid, solved_on_grid
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.classical import Giesekus
-from discover.protocols import (
-    imposed_stress,
-    oscillations,
-    oscillatory_shear,
-    steady_rates,
-)
+from discover.protocols import imposed_stress, oscillations, oscillatory_shear, steady_rates
 from discover.protocols.protocol import recording
 from discover.simulate import SimulationError, observe, simulate
 
@@ -59,7 +54,6 @@ def test_an_amplitude_sweep_is_where_scipy_ends():
 
 
 def swept(law, strains):
-    """Return the moduli of a sweep."""
     n = len(strains)
     protocol = oscillations(np.asarray(strains), np.full(n, FREQUENCY))
     ((flows, grids),) = lay_out([protocol], [np.arange(1.0, n + 1.0)]).parts

@@ -36,14 +36,10 @@ def fluid():
 
 
 def in_the_loop(protocols, times=TIMES):
-    """Return what the closed loop's model predicts."""
-    runs = [
-        Run(str(i), times, protocol, np.ones(len(times)), np.ones(len(times)))
-        for i, protocol in enumerate(protocols)
-    ]
-    declared = DeclaredModel(
-        make_law("giesekus", {"alpha": MOBILITY}), MODULUS, TIME, solvent_viscosity=SOLVENT
-    )
+    ones = np.ones(len(times))
+    runs = [Run(str(i), times, protocol, ones, ones) for i, protocol in enumerate(protocols)]
+    law = make_law("giesekus", {"alpha": MOBILITY})
+    declared = DeclaredModel(law, MODULUS, TIME, solvent_viscosity=SOLVENT)
     model = AugmentedModel(declared, [])
     return model.predict(model.zero(), make_batch(runs, strain_step=0.05))
 
@@ -83,7 +79,6 @@ def test_a_smooth_or_thinned_rate_stays_in_its_flow_and_after_what_came_before(k
     begun = after_steady_flow(sampled, 2.0, 3.0)
     for protocol in (sampled, begun):
         smooth = another_between_samples(protocol, times)
-        assert smooth is not None
         assert smooth.flow == kind
         assert float(smooth.begins) == float(protocol.begins)
         at = np.array([-0.5, 0.0, 1.025, 2.975])
@@ -94,18 +89,21 @@ def test_a_smooth_or_thinned_rate_stays_in_its_flow_and_after_what_came_before(k
     assert thin_run(run, 30).flow == kind
 
 
-def test_troutons_ratios_are_three_four_and_six():
+def test_troutons_ratios_are_those_of_a_solvent_and_work_is_that_of_equivalent_shear():
     ratios = {"shear": 1.0, "uniaxial": 3.0, "planar": 4.0, "biaxial": 6.0}
     assert {kind: float(kinematics_of(kind).viscous) for kind in ratios} == ratios
-
-
-def test_a_solvent_pulls_at_the_first_instant_with_troutons_ratio():
     pull = in_flow(start_up(0.5), "uniaxial")
     stress = simulate(fluid(), pull, np.array([0.0]))
     assert recorded_at(pull, stress.components) == pytest.approx([3.0 * SOLVENT * 0.5])
+    stress = jnp.array([3.0, -1.0, 0.5, 0.7])
+    for kind, unit in UNIT.items():
+        flow = kinematics_of(kind)
+        full = np.array([[3.0, 0.7, 0.0], [0.7, -1.0, 0.0], [0.0, 0.0, 0.5]])
+        work = float(np.sum(full * unit))
+        assert float(flow.intensity * flow.equivalent_shear_stress(stress)) == pytest.approx(work)
 
 
-def test_what_cannot_have_come_before_is_refused():
+def test_what_cannot_have_come_before_and_an_unknown_flow_are_refused():
     for nonsense, word in (
         (lambda: after_steady_flow(start_up(1.0), 0.0, 5.0), "must not be 0"),
         (lambda: after_steady_flow(start_up(1.0), 2.0, 0.0), "end must be a positive time"),
@@ -113,20 +111,7 @@ def test_what_cannot_have_come_before_is_refused():
         (lambda: after_step_strain(start_up(0.0), 1.0, -0.1), "first must be"),
         (lambda: after_alternation(start_up(1.0), 0.0, TIMES), "period must be"),
         (lambda: after_steady_flow(oscillatory_shear(1.0, 1.0), 2.0, 5.0), "has no beginning"),
+        (lambda: in_flow(start_up(1.0), "triaxial"), "shear, uniaxial, planar, biaxial"),
     ):
         with pytest.raises(InputError, match=word):
             nonsense()
-
-
-def test_an_unknown_flow_is_refused_with_those_that_are_known():
-    with pytest.raises(InputError, match="shear, uniaxial, planar, biaxial"):
-        in_flow(start_up(1.0), "triaxial")
-
-
-def test_the_work_of_a_flow_is_that_of_its_equivalent_shear():
-    stress = jnp.array([3.0, -1.0, 0.5, 0.7])
-    for kind, unit in UNIT.items():
-        flow = kinematics_of(kind)
-        full = np.array([[3.0, 0.7, 0.0], [0.7, -1.0, 0.0], [0.0, 0.0, 0.5]])
-        work = float(np.sum(full * unit))
-        assert float(flow.intensity * flow.equivalent_shear_stress(stress)) == pytest.approx(work)

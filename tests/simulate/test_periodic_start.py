@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from vectors import sweep_of, vector_of
 
+from discover import protocols
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
@@ -16,14 +17,6 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.of_fluids import observed_in
 from discover.laws import Fluid, Giesekus
-from discover.protocols import (
-    after_alternation,
-    measured_rate,
-    oscillatory_shear,
-    settled,
-    shear_rates,
-    start_up,
-)
 from discover.simulate import simulate
 
 MODULUS, MOBILITY, FREQUENCY = 100.0, 0.3, 1.0
@@ -39,9 +32,9 @@ def giesekus_after(cycles, time, strain):
 
 
 def alternating(strain):
-    rate = oscillatory_shear(strain * FREQUENCY, FREQUENCY)
-    protocol = after_alternation(rate, PERIOD, TIMES)
-    return Run("swing", TIMES, protocol, shear_rates(rate, TIMES), np.ones(65))
+    rate = protocols.oscillatory_shear(strain * FREQUENCY, FREQUENCY)
+    protocol = protocols.after_alternation(rate, PERIOD, TIMES)
+    return Run("swing", TIMES, protocol, protocols.shear_rates(rate, TIMES), np.ones(65))
 
 
 def predicted(declared, runs, **values):
@@ -49,19 +42,16 @@ def predicted(declared, runs, **values):
     return model.predict(vector_of(model, **values), make_batch(runs, strain_step=0.1))
 
 
-def test_a_slow_mode_is_periodic_from_the_first_sample():
+def test_a_slow_mode_is_periodic_from_the_first_sample_be_it_of_a_thousand_periods():
     time, strain = 100.0, 3.0
     declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, time)
     (found,) = predicted(declared, [alternating(strain)])
-    settled = giesekus_after(10 + int(12 * time / PERIOD), time, strain)
+    periodic = giesekus_after(10 + int(12 * time / PERIOD), time, strain)
     # steps of fourth order of a tenth of strain: 1e-5; scipy has settled to e⁻¹²
-    np.testing.assert_allclose(found, settled, atol=5e-5 * np.max(np.abs(settled)))
+    np.testing.assert_allclose(found, periodic, atol=5e-5 * np.max(np.abs(periodic)))
     waited = giesekus_after(10, time, strain)
     # what ten cycles of waiting leave: 16 %
-    assert np.linalg.norm(waited - settled) > 0.1 * np.linalg.norm(settled)
-
-
-def test_a_mode_of_a_thousand_periods_takes_no_more_than_a_fast_one():
+    assert np.linalg.norm(waited - periodic) > 0.1 * np.linalg.norm(periodic)
     # closed form: G ωλ/(1 + ω²λ²) (cos + ωλ sin)
     time = 1000.0 * PERIOD
     (found,) = predicted(DeclaredModel.maxwell(MODULUS, time), [alternating(2.0)])
@@ -76,13 +66,13 @@ def test_a_record_in_samples_begins_as_the_wave_that_they_are_of():
     declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, 100.0)
     times = np.linspace(3.0, 3.0 + 2.0 * PERIOD, 257)
     rates = np.cos(FREQUENCY * times)
-    protocol = after_alternation(measured_rate(times, rates), PERIOD, times)
+    protocol = protocols.after_alternation(protocols.measured_rate(times, rates), PERIOD, times)
     run = Run("samples", times, protocol, rates, np.ones(257), rate_is_measured=True)
     (found,) = predicted(declared, [run])
-    settled = giesekus_after(10 + int(12 * 100.0 / PERIOD), 100.0, 1.0)
-    exact = np.interp((times * FREQUENCY) % (2.0 * np.pi), TIMES, settled)
+    periodic = giesekus_after(10 + int(12 * 100.0 / PERIOD), 100.0, 1.0)
+    exact = np.interp((times * FREQUENCY) % (2.0 * np.pi), TIMES, periodic)
     # straight lines between 128 samples, and 64 knots, a cycle
-    np.testing.assert_allclose(found, exact, atol=3e-3 * np.max(np.abs(settled)))
+    np.testing.assert_allclose(found, exact, atol=3e-3 * np.max(np.abs(periodic)))
     assert bool(jnp.all(protocol.cycle == jnp.array([3.0 - PERIOD, 3.0])))
 
 
@@ -92,12 +82,12 @@ def test_cycles_that_are_waited_for_bring_the_slowest_mode_to_the_same_state(sam
     time = 100.0
     if sampled:
         times = np.linspace(3.0, 3.0 + PERIOD, 257)
-        wave = measured_rate(times, 3.0 * np.cos(FREQUENCY * times))
-        begun = after_alternation(wave, PERIOD, times)
+        wave = protocols.measured_rate(times, 3.0 * np.cos(FREQUENCY * times))
+        begun = protocols.after_alternation(wave, PERIOD, times)
     else:
         times, begun = TIMES, alternating(3.0).protocol
-    protocol = settled(begun, time)
-    assert settled(protocol, time) is protocol
+    protocol = protocols.settled(begun, time)
+    assert protocols.settled(protocol, time) is protocol
     fluid = Fluid(Giesekus(MOBILITY), MODULUS, time)
     waiting = replace(protocol, cycle=np.zeros(2))
     found = observed_in(fluid, waiting, times)[:, 0]
@@ -107,14 +97,11 @@ def test_cycles_that_are_waited_for_bring_the_slowest_mode_to_the_same_state(sam
     assert np.linalg.norm(found - exact) < 5e-3 * np.linalg.norm(exact)
 
 
-def test_nobody_waits_for_thousands_of_cycles():
+def test_nobody_waits_for_thousands_of_cycles_nor_for_what_does_not_start_periodic():
     with pytest.raises(InputError, match="Use close-loop"):
-        settled(alternating(1.0).protocol, 1e4)
-
-
-def test_what_does_not_start_periodic_has_nothing_to_wait_for():
-    protocol = start_up(1.0)
-    assert settled(protocol, 1e6) is protocol
+        protocols.settled(alternating(1.0).protocol, 1e4)
+    protocol = protocols.start_up(1.0)
+    assert protocols.settled(protocol, 1e6) is protocol
 
 
 @pytest.mark.parametrize("time", [1.0, 100.0, 1e4])
@@ -162,7 +149,7 @@ def test_moduli_of_modes_over_thirteen_decades_are_their_closed_form():
     np.testing.assert_allclose(moduli_of(giesekus, run), exact, rtol=1e-4)
 
 
-def test_lag_delay_inertia_and_gain_change_a_modulus_by_their_closed_forms():
+def test_lag_delay_inertia_gain_and_friction_change_a_modulus_by_their_closed_forms():
     iw, plain = 1j * FREQUENCIES, moduli_of(GIESEKUS, SWEEP)
     for name, value, expected in (
         ("transducer_lag", 0.02, plain / (1.0 + 0.02 * iw)),
@@ -175,9 +162,6 @@ def test_lag_delay_inertia_and_gain_change_a_modulus_by_their_closed_forms():
     ):
         found = moduli_of(GIESEKUS, SWEEP, **{name: value})
         np.testing.assert_allclose(found, expected, rtol=1e-9, err_msg=name)
-
-
-def test_coulomb_friction_adds_to_the_loss_modulus_alone():
     added = moduli_of(MAXWELL, SWEEP, bearing_friction=2.0) - moduli_of(MAXWELL, SWEEP)
     # 4/π of a square wave; the trapezoidal rule meets its kink
     np.testing.assert_allclose(added, 4j * 2.0 / np.pi / STRAINS, rtol=1e-3, atol=1e-5)

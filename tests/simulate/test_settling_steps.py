@@ -88,9 +88,8 @@ def test_steps_that_grow_before_an_oscillation_has_died_out_are_seen_to_be_off()
 
 
 def test_a_structure_slower_than_the_relaxation_is_followed_in_long_steps():
-    name, critical, build_up, slowness, share = (
-        "thixotropic_relaxation_two_times", 0.7, 1.5, 8.0, 0.3,
-    )  # fmt: skip
+    name, critical, build_up = "thixotropic_relaxation_two_times", 0.7, 1.5
+    slowness, share = 8.0, 0.3
     declared = DeclaredModel.named("giesekus", {"alpha": 0.2}, 100.0, TIME)
     model = AugmentedModel(declared, [named_effects()[name]])
     theta = vector_of(model, **{name: (1.0 / critical, build_up, slowness, share)})
@@ -100,13 +99,11 @@ def test_a_structure_slower_than_the_relaxation_is_followed_in_long_steps():
         critical, (build_up, slowness * build_up), 2.0 / 3.0, share, by_stress=False,
         in_modulus=False, modulus=100.0, relaxation_time=TIME, mobility=0.2,
     ).respond(RECORD, TIMES).sigma12  # fmt: skip
-    assert (
-        batch.parts[0].times.shape[1] // 2 < 0.6 * make_grid(FLOW, TIMES, strain_step=0.25)[0].size
-    )
+    steps = batch.parts[0].times.shape[1] // 2
+    assert steps < 0.6 * make_grid(FLOW, TIMES, strain_step=0.25)[0].size
+    found = model.predict(theta, batch)[0]
     # of second order in time at the jump: tests/effects/test_structure.py
-    np.testing.assert_allclose(
-        model.predict(theta, batch)[0], exact, atol=2e-3 * np.max(np.abs(exact))
-    )
+    np.testing.assert_allclose(found, exact, atol=2e-3 * np.max(np.abs(exact)))
 
 
 MODULUS, CHAIN_TIMES = (1000.0, 300.0, 100.0), (1e-3, 0.1, 10.0)
@@ -155,7 +152,5 @@ def test_steps_are_cut_until_cutting_them_changes_nothing(ratio):
     # a change of 1e-4 on halving bounds the error of a method that converges
     assert np.linalg.norm(found - wanted) < 2e-4 * np.linalg.norm(wanted)
     assert pieces < 10
-
-
-def test_a_law_that_does_not_retract_keeps_its_steps():
+    # control: a law that does not retract keeps its steps
     assert pieces_in_time(Fluid(make_law("giesekus", {"alpha": 0.3}), 1.0, 1.0), [RUN], 0.2) == 1

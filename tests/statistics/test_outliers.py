@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from independent import noise
 from scipy.integrate import solve_ivp
 
 from discover.statistics.noise.outliers import isolated
@@ -11,10 +12,7 @@ WAVE = np.sin(2.0 * TIMES)
 
 
 def correlated(rho, generator, size=0.02, n=200):
-    drawn = generator.standard_normal(n)
-    for i in range(1, n):
-        drawn[i] = rho * drawn[i - 1] + np.sqrt(1.0 - rho**2) * drawn[i]
-    return size * drawn
+    return size * (noise.correlated(np.ones(n), 1.0, rho, generator) - 1.0)
 
 
 @pytest.mark.parametrize("share", [0.02, 0.05])
@@ -94,15 +92,12 @@ def test_noise_and_what_ends_suddenly_are_no_outliers_near_an_end(correlation):
             assert not np.any(isolated(record + noise)[[0, 1, 2, -3, -2, -1]])
 
 
-def test_samples_that_read_zero_side_by_side_are_outliers_where_the_stress_is_not_zero():
+def test_samples_that_read_zero_are_outliers_unless_the_stress_passes_or_rests_there():
     record = 1.0 - np.exp(-TIMES) + correlated(0.0, np.random.default_rng(6))
     dropped = [20, 21, 30, 32, 33, 34, 100]
     record[dropped] = 0.0
     assert np.flatnonzero(isolated(record)).tolist() == dropped
-
-
-def test_a_stress_that_passes_or_rests_at_zero_has_no_outlier():
-    """Records without noise that read exactly zero: a wave, a cusp, a rest before the flow."""
+    # records without noise that read exactly zero: a wave, a cusp, a rest before the flow
     wave = np.round(np.sin(0.1 * np.pi * np.arange(200)), 12)
     cusp = np.abs(np.arange(-100.0, 100.0)) / 100.0
     rest = np.append(np.zeros(30), 1.0 - np.exp(-TIMES))

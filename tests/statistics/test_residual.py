@@ -20,16 +20,13 @@ def test_the_noise_of_a_smooth_misfit_is_not_its_size():
     )
 
 
-def test_separate_points_of_noise_alone_agree_as_seldom_as_the_level_says():
+def test_separate_points_of_noise_agree_as_the_level_says_and_a_smooth_misfit_is_no_noise():
     generator = np.random.default_rng(2)
     # louder where the stress is large, as of a flow curve
     rows = [generator.standard_normal(n) * np.geomspace(1.0, 3.0, n) for n in [7, 12, 25] * 100]
     low = sum(separate_probability([row]) <= 0.05 for row in rows)
     # 5 % of 300, within three standard deviations of a binomial count
     assert low <= 15 + 3 * np.sqrt(300 * 0.05 * 0.95)
-
-
-def test_a_smooth_misfit_of_separate_points_is_no_noise():
     smooth = np.cos(np.linspace(0.0, 2.0 * np.pi, 20))
     left = 3.0 * smooth + np.random.default_rng(0).standard_normal(20)
     assert separate_probability([left]) < 0.01

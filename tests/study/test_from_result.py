@@ -71,21 +71,17 @@ def declared(file):
     return declared_model(read_study(file), DATA)
 
 
-def test_a_loop_gives_its_law_its_modes_and_every_effect_with_its_value(tmp_path):
+def test_a_loop_and_a_comparison_give_their_laws_modes_and_effects_with_values(tmp_path):
     found = declared(write(tmp_path, "loop.json", LOOP))
     assert [(t.term, t.coefficient) for t in found.law.as_terms()] == [("sigma.sigma", 0.3)]
     assert found.modulus.tolist() == [90.0, 40.0]
-    assert {known.name: known.values for known in found.effects} == {
-        "stress_gain": (-0.1,),
-        "ptt_linear": (0.2,),
-    }
+    constants = {known.name: known.values for known in found.effects}
+    assert constants == {"stress_gain": (-0.1,), "ptt_linear": (0.2,)}
     assert not found.free_constants
     assert "the loop's declared law" in found.source
     assert "stress gain (gain_error = -0.1)" in found.source
-
-
-def test_a_comparison_gives_its_law_and_the_instrument_of_its_likeliest_hypothesis(tmp_path):
-    found = declared(write(tmp_path, "comparison.json", COMPARISON))
+    (tmp_path / "compared").mkdir()
+    found = declared(write(tmp_path / "compared", "comparison.json", COMPARISON))
     assert [known.name for known in found.effects] == ["stress_gain"]
     assert "the comparison's declared law" in found.source
     # the loop takes a law of terms as it takes one with a name
@@ -94,12 +90,11 @@ def test_a_comparison_gives_its_law_and_the_instrument_of_its_likeliest_hypothes
     assert [known.name for known in model.effects] == ["stress_gain"]
 
 
-def test_a_law_without_terms_is_the_maxwell_law(tmp_path):
+def test_a_law_is_taken_by_its_name_with_its_constants_and_terms_and_without_any_is_maxwells(
+    tmp_path,
+):
     plain = {**LOOP, "declared": {"law": {**LAW, "terms": []}, "effects": []}}
     assert declared(write(tmp_path, "loop.json", plain)).law_name == "ucm"
-
-
-def test_a_law_with_a_name_is_taken_with_its_constants_and_the_terms_beside_it(tmp_path):
     constants = {"stretch_time_ratio": 0.2, "beta": 0.5}
     law = {**LAW, "named": {"law": "rolie_poly", "constants": [constants]}}
     loop = {**LOOP, "declared": {"law": {**law, "terms": []}, "effects": []}}
@@ -110,9 +105,8 @@ def test_a_law_with_a_name_is_taken_with_its_constants_and_the_terms_beside_it(t
     assert model.free_positions == []
     assert dict(model.parameters) == constants
     # with a term
-    found = declared(
-        write(tmp_path, "loop.json", {**loop, "declared": {"law": law, "effects": []}})
-    )
+    beside = {**loop, "declared": {"law": law, "effects": []}}
+    found = declared(write(tmp_path, "loop.json", beside))
     core, terms = found.law.split()
     assert type(core).__name__ == "RoliePoly"
     assert [share.term for share in terms] == ["sigma.sigma"]
@@ -120,7 +114,7 @@ def test_a_law_with_a_name_is_taken_with_its_constants_and_the_terms_beside_it(t
     assert forward_model(found).free_positions == []
 
 
-def test_constants_are_said_to_count_as_exact_with_the_intervals_that_they_had(tmp_path):
+def test_constants_count_as_exact_with_intervals_said_unless_the_study_frees_them(tmp_path):
     said = declared(write(tmp_path, "loop.json", LOOP)).source
     assert "count as exact" in said
     assert "gain_error of stress_gain -0.12 to -0.08, epsilon of ptt_linear 0.1 to 0.3" in said
@@ -132,23 +126,19 @@ def test_constants_are_said_to_count_as_exact_with_the_intervals_that_they_had(t
     ):
         (tmp_path / name).mkdir()
         assert "modulus_Pa 80 to 99" in declared(write(tmp_path / name, name, content)).source
-
-
-def test_an_effect_of_the_study_replaces_that_which_was_found_with_its_interval(tmp_path):
     model = 'from = "earlier"\neffects = { ptt_linear = "fit" }'
     found = declared(write(tmp_path, "loop.json", LOOP, model))
     assert found.free_constants == ("ptt_linear.epsilon",)
     assert "epsilon of ptt_linear" not in found.source
 
 
-def test_what_is_unexplained_is_taken_with_the_doubt_said(tmp_path):
-    doubtful = {**LOOP, "verdict": "unexplained"}
-    assert "did not explain" in declared(write(tmp_path, "loop.json", doubtful)).source
-
-
 @pytest.mark.parametrize("name", ["loop.json", "comparison.json"])
-def test_where_no_effect_was_found_the_declared_law_is_taken_with_the_doubt_said(tmp_path, name):
-    """Where it is more than Maxwell's, or an instrument was declared beside it."""
+def test_what_is_unexplained_is_taken_with_the_doubt_said_where_there_is_more_than_maxwell(
+    tmp_path, name
+):
+    """A law or an instrument that was declared, or an effect that was found."""
+    doubtful = {**(LOOP if name == "loop.json" else COMPARISON), "verdict": "unexplained"}
+    assert "did not explain" in declared(write(tmp_path, name, doubtful)).source
     for i, (terms, known) in enumerate(((LAW["terms"], []), ([], [GAIN]))):
         (tmp_path / f"{i}").mkdir()
         started = {"law": {**LAW, "terms": terms}, "effects": known}
@@ -156,14 +146,6 @@ def test_where_no_effect_was_found_the_declared_law_is_taken_with_the_doubt_said
         assert len(found.law.as_terms()) == len(terms)
         assert [one.name for one in found.effects] == [effect["effect"] for effect in known]
         assert "did not explain" in found.source
-
-
-def test_the_fingerprint_changes_with_what_is_taken(tmp_path):
-    file = write(tmp_path, "loop.json", LOOP)
-    before = fingerprint(read_study(file))
-    assert fingerprint(read_study(file)) == before
-    write(tmp_path, "loop.json", {**LOOP, "stages": []})
-    assert fingerprint(read_study(file)) != before
 
 
 def shear(found, rate=5.0):
@@ -200,11 +182,16 @@ def test_constants_by_mode_of_a_loop_are_taken_with_those_of_every_mode(tmp_path
         assert "in each mode its own giesekus mobility (alpha = 0.5) at 0.1 s to" in found.source
 
 
-def test_a_constant_that_is_the_same_in_all_modes_is_one_constant(tmp_path):
+def test_a_constant_that_is_the_same_in_all_modes_is_one_and_the_fingerprint_changes(tmp_path):
     alpha = {**MOBILITY_BY_MODE["parameters"]["alpha"], "degree": 0}
     stage = {**MOBILITY_BY_MODE, "parameters": {"alpha": alpha}}
     found = declared(write(tmp_path, "loop.json", {**LOOP, "stages": [stage]}))
     assert ("giesekus_mobility", (0.2,)) in [(known.name, known.values) for known in found.effects]
+    file = write(tmp_path, "loop.json", LOOP)
+    before = fingerprint(read_study(file))
+    assert fingerprint(read_study(file)) == before
+    write(tmp_path, "loop.json", {**LOOP, "stages": []})
+    assert fingerprint(read_study(file)) != before
 
 
 _BY_MODE = {"law": None, "effects": [], "by_mode": ["alpha"]}
@@ -242,24 +229,18 @@ def test_where_nothing_can_be_taken_one_error_says_why(tmp_path, name, content, 
     assert words in str(caught.value)
 
 
-def test_a_result_that_is_not_finished_is_refused(tmp_path):
+def test_a_result_that_is_not_finished_or_not_there_and_a_law_beside_it_are_refused(tmp_path):
+    with pytest.raises(InputError, match="there is no folder"):
+        declared(write(tmp_path, "loop.json", LOOP, 'from = "elsewhere"'))
+    file = write(tmp_path, "loop.json", LOOP, 'from = "earlier"\nlaw = "giesekus"')
+    with pytest.raises(InputError, match="law is given too"):
+        read_study(file)
     file = write(tmp_path, "loop.json", LOOP)
     state = tmp_path / "earlier" / "state"
     state.mkdir()
     (state / "study.json").write_text('{"fingerprint": "f", "complete": false}')
     with pytest.raises(InputError, match="is not finished"):
         declared(file)
-
-
-def test_a_folder_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(InputError, match="there is no folder"):
-        declared(write(tmp_path, "loop.json", LOOP, 'from = "elsewhere"'))
-
-
-def test_a_law_beside_from_is_refused(tmp_path):
-    file = write(tmp_path, "loop.json", LOOP, 'from = "earlier"\nlaw = "giesekus"')
-    with pytest.raises(InputError, match="law is given too"):
-        read_study(file)
 
 
 def sweep_of(moduli, times):
@@ -271,22 +252,18 @@ def sweep_of(moduli, times):
     return LinearSweep(omega, storage, (x / (1 + x**2)) @ np.array(moduli))
 
 
-def test_modes_of_the_sweep_keep_its_error(tmp_path):
+def test_modes_of_the_sweep_keep_its_error_and_other_modes_have_none(tmp_path):
     """A result holds modes alone, and intervals that ignore their errors would be too narrow."""
     sweep = sweep_of([90.0, 40.0], [1.0, 0.1])
-    spectrum = relaxation_spectrum(sweep)
+    data, spectrum = replace(DATA, linear_sweep=sweep), relaxation_spectrum(sweep)
     rows = [
         {"modulus_Pa": 0.9 * g, "relaxation_time_s": t}
         for g, t in zip(spectrum.modulus, spectrum.relaxation_time, strict=True)
     ]
     loop = {**LOOP, "declared": {"law": {**LAW, "modes": rows}, "effects": []}}
-    file = write(tmp_path, "loop.json", loop)
-    found = declared_model(read_study(file), replace(DATA, linear_sweep=sweep))
+    found = declared_model(read_study(write(tmp_path, "loop.json", loop)), data)
     assert forward_model(found).linear_error == spectrum.relative_error > 0.0
     assert found.modulus_covariance == pytest.approx(0.81 * spectrum.modulus_covariance)
-
-
-def test_control_other_modes_have_no_error_of_the_sweep(tmp_path):
-    data = replace(DATA, linear_sweep=sweep_of([90.0, 40.0], [1.0, 0.1]))
-    found = declared_model(read_study(write(tmp_path, "loop.json", LOOP)), data)
-    assert found.spectrum is None
+    # control
+    other = declared_model(read_study(write(tmp_path, "loop.json", LOOP)), data)
+    assert other.spectrum is None

@@ -15,9 +15,11 @@ from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model
 
 SYNTHETIC = {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 20}}
-
-
 TIMES = np.linspace(0.0, 2.0, 15)
+
+
+def of_study(data):
+    return load_study_data(parse_study({"data": data}))
 
 
 def make_folder(path, **more):
@@ -112,56 +114,43 @@ def test_files_that_are_no_study_are_refused(tmp_path):
             read_study(path)
 
 
-def test_held_out_runs_are_not_among_those_to_fit():
-    data = load_study_data(parse_study({"data": {**SYNTHETIC, "held_out": ["laos_1_1"]}}))
+def test_held_out_runs_are_not_to_fit_and_all_are_where_each_is_held_out_in_turn():
+    data = of_study({**SYNTHETIC, "held_out": ["laos_1_1"]})
     assert data.held_out.names == ("laos_1_1",)
     assert "laos_1_1" not in data.fit.names
     assert len(data.fit) == 7
     with pytest.raises(InputError, match="nothing"):  # that is no run
-        load_study_data(parse_study({"data": {**SYNTHETIC, "held_out": ["nothing"]}}))
-
-
-def test_all_runs_are_to_fit_where_each_is_held_out_in_turn():
-    data = load_study_data(parse_study({"data": {**SYNTHETIC, "held_out": "each"}}))
+        of_study({**SYNTHETIC, "held_out": ["nothing"]})
+    data = of_study({**SYNTHETIC, "held_out": "each"})
     assert data.each
-    assert len(data.fit) == 8
-    assert len(data.held_out) == 0
-    alone = {**SYNTHETIC, "held_out": "each", "fit": ["laos_1_1"]}
+    assert (len(data.fit), len(data.held_out)) == (8, 0)
     with pytest.raises(InputError, match="at least 2 runs"):
-        load_study_data(parse_study({"data": alone}))
+        of_study({**SYNTHETIC, "held_out": "each", "fit": ["laos_1_1"]})
 
 
-def test_a_folder_is_found_beside_the_study_file(tmp_path, monkeypatch):
+def test_a_folder_is_found_beside_the_study_and_the_fingerprint_changes_with_study_and_data(
+    tmp_path, monkeypatch
+):
     monkeypatch.delenv("DISCOVER_DATA", raising=False)
     make_folder(tmp_path / "runs")
     file = tmp_path / "s.toml"
     file.write_text('[data]\nfolder = "runs"\n')
     assert load_study_data(read_study(file)).fit.names == ("r0.csv", "r1.csv")
-
-
-def test_known_relaxation_false_leaves_an_elastic_law():
-    study = parse_study({"data": SYNTHETIC, "model": {"known_relaxation": False}})
-    model = declared_model(study, load_study_data(study).dataset)
-    assert not model.law.linear_relaxation
-
-
-def test_modes_without_a_sweep_are_an_input_error():
-    study = parse_study({"data": SYNTHETIC, "model": {"modes": "lve"}})
-    with pytest.raises(InputError, match=r"lve\.csv"):
-        # computed data bring an exact sweep of their own
-        declared_model(study, replace(load_study_data(study).dataset, linear_sweep=None))
-
-
-def test_the_fingerprint_changes_with_study_seed_and_data(tmp_path):
-    make_folder(tmp_path / "runs")
-    file = tmp_path / "s.toml"
-    file.write_text('[data]\nfolder = "runs"\n')
     first = fingerprint(read_study(file), 1)
     assert first == fingerprint(read_study(file), 1)
     assert first != fingerprint(read_study(file), 2)
     with (tmp_path / "runs" / "r0.csv").open("a") as stream:
         stream.write("\n3.0,0.99,1.0")
     assert first != fingerprint(read_study(file), 1)
+
+
+def test_known_relaxation_false_leaves_an_elastic_law_and_modes_without_a_sweep_are_an_error():
+    study = parse_study({"data": SYNTHETIC, "model": {"known_relaxation": False}})
+    assert not declared_model(study, load_study_data(study).dataset).law.linear_relaxation
+    study = parse_study({"data": SYNTHETIC, "model": {"modes": "lve"}})
+    with pytest.raises(InputError, match=r"lve\.csv"):
+        # computed data bring an exact sweep of their own
+        declared_model(study, replace(load_study_data(study).dataset, linear_sweep=None))
 
 
 def test_the_fingerprint_is_of_the_files_that_are_read_whatever_their_names_end_in(tmp_path):
@@ -184,7 +173,9 @@ def test_the_fingerprint_is_of_the_files_that_are_read_whatever_their_names_end_
     assert fingerprint(study) == first
 
 
-def test_a_run_folder_resumes_and_refuses_another_study(tmp_path):
+def test_a_run_folder_resumes_refuses_another_study_and_takes_one_where_nothing_was_computed(
+    tmp_path,
+):
     folder = RunFolder(tmp_path / "out", "one")
     folder.save("part", {"x": [0.1, 1e-300]})
     again = RunFolder(tmp_path / "out", "one")
@@ -197,49 +188,33 @@ def test_a_run_folder_resumes_and_refuses_another_study(tmp_path):
     fresh = RunFolder(tmp_path / "out", "two", overwrite=True)
     assert fresh.load("part") is None
     assert not fresh.complete
-
-
-def test_a_folder_in_which_nothing_was_computed_takes_a_mended_study(tmp_path):
-    RunFolder(tmp_path / "out", "with a mistake")
-    RunFolder(tmp_path / "out", "mended").save("part", {})
+    RunFolder(tmp_path / "new", "with a mistake")
+    RunFolder(tmp_path / "new", "mended").save("part", {})
     with pytest.raises(InputError, match="--overwrite"):
-        RunFolder(tmp_path / "out", "yet another")
+        RunFolder(tmp_path / "new", "yet another")
 
 
-def test_overwrite_leaves_files_alone_that_are_not_ours(tmp_path):
+def test_overwrite_leaves_files_alone_that_are_not_ours_and_a_file_is_no_folder(tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
     RunFolder(tmp_path, "one").save("part", {})
     RunFolder(tmp_path, "one", overwrite=True)
     assert (tmp_path / "thesis.txt").read_text() == "mine"
-
-
-def test_a_file_in_place_of_the_result_folder_is_an_input_error(tmp_path):
-    (tmp_path / "out").write_text("")
     with pytest.raises(InputError, match="is a file"):
-        RunFolder(tmp_path / "out", "one")
+        RunFolder(tmp_path / "thesis.txt", "one")
 
 
-def with_an_extension(path):
+def test_a_stress_that_is_not_observed_judges_and_a_run_without_another_cannot_be_fitted(tmp_path):
     table = {"time_s": TIMES + 0.1, "hencky_rate_1_s": 0.5 + 0 * TIMES, "tensile_stress_Pa": TIMES}
     index = "file,flow\nr0.csv,\nr1.csv,\npull.csv,uniaxial\n"
-    return make_folder(path, runs__csv=index, pull__csv=csv(table))
-
-
-def test_a_stress_that_is_not_observed_judges(tmp_path):
-    folder = str(with_an_extension(tmp_path / "melt"))
-    both = load_study_data(parse_study({"data": {"folder": folder}}))
-    assert both.fit.names == ("r0.csv", "r1.csv", "pull.csv")
-    shear = load_study_data(parse_study({"data": {"folder": folder, "observe": ["sigma12"]}}))
+    folder = {"folder": str(make_folder(tmp_path, runs__csv=index, pull__csv=csv(table)))}
+    assert of_study(folder).fit.names == ("r0.csv", "r1.csv", "pull.csv")
+    shear = of_study({**folder, "observe": ["sigma12"]})
     assert shear.fit.names == ("r0.csv", "r1.csv")
     assert shear.held_out.names == ("pull.csv",)
-    pulled = {"folder": folder, "observe": ["tensile_stress"], "held_out": ["r0.csv"]}
-    assert load_study_data(parse_study({"data": pulled})).held_out.names == ("r0.csv", "r1.csv")
-
-
-def test_a_run_cannot_be_fitted_whose_stress_is_not_observed(tmp_path):
-    data = {"folder": str(with_an_extension(tmp_path / "melt")), "observe": ["sigma12"]}
+    pulled = of_study({**folder, "observe": ["tensile_stress"], "held_out": ["r0.csv"]})
+    assert pulled.held_out.names == ("r0.csv", "r1.csv")
     with pytest.raises(InputError, match=r"pull\.csv.*recorded nothing that is in observe"):
-        load_study_data(parse_study({"data": data | {"fit": ["pull.csv"]}}))
+        of_study({**folder, "observe": ["sigma12"], "fit": ["pull.csv"]})
 
 
 def test_all_problems_of_a_study_file_are_told_at_once_each_with_what_was_probably_meant():
@@ -258,9 +233,7 @@ def test_all_problems_of_a_study_file_are_told_at_once_each_with_what_was_probab
     assert sum("strain must be" in one for one in problems) == 1
     assert len(problems) == 7
     assert str(error.value).startswith("my.toml: 7 problems.")
-
-
-def test_one_problem_is_one_sentence_and_a_name_like_no_other_gets_no_guess():
+    # one problem is one sentence, and a name like no other gets no guess
     with pytest.raises(InputError) as error:
         parse_study({"data": SYNTHETIC, "zzz": 1}, "my.toml")
     assert str(error.value).startswith("my.toml: unknown key 'zzz'. Known keys there are: data")
@@ -309,7 +282,13 @@ def test_modes_that_nobody_declares_are_the_sweeps_or_fitted_and_those_of_comput
     assert (exact.modulus.tolist(), exact.relaxation_time.tolist(), exact.free) == ([1], [1], ())
 
 
-def test_the_solvent_of_the_sweep_is_found_and_its_error_handed_on():
+def test_modes_may_be_listed_or_counted_and_a_solvent_is_the_sweeps_or_counts_once():
+    model = declared("modulus_Pa = [1200, 6000]", "relaxation_time_s = [1.5, 0.08]")
+    np.testing.assert_allclose(model.modulus, [1200.0, 6000.0])
+    assert model.solvent_viscosity == 0.0
+    assert len(declared("modes = 3").modulus) == 3
+    free = declared("modulus_Pa = 3.0", 'solvent_viscosity_Pa_s = "fit"')
+    assert [one.name for one in free.effects if one.free] == ["solvent_viscosity"]
     model = declared('modes = "lve"')
     assert model.solvent_viscosity == pytest.approx(SOLVENT, rel=0.05)
     np.testing.assert_allclose(model.modulus, MODULUS, rtol=0.05)
@@ -317,22 +296,10 @@ def test_the_solvent_of_the_sweep_is_found_and_its_error_handed_on():
     errors = np.sqrt(np.diag(model.modulus_covariance))
     assert len(errors) == 3
     assert 0.001 < errors[-1] / SOLVENT < 0.02
-
-
-def test_a_declared_solvent_counts_once():
     model = declared('modes = "lve"', "solvent_viscosity_Pa_s = 25.0")
     assert model.solvent_viscosity == 25.0
     assert len(model.modulus) == 2
     assert declared('modes = "lve"', "solvent_viscosity_Pa_s = 0.0").solvent_viscosity == 0.0
-
-
-def test_modes_may_be_listed_or_counted():
-    model = declared("modulus_Pa = [1200, 6000]", "relaxation_time_s = [1.5, 0.08]")
-    np.testing.assert_allclose(model.modulus, [1200.0, 6000.0])
-    assert model.solvent_viscosity == 0.0
-    assert len(declared("modes = 3").modulus) == 3
-    free = declared("modulus_Pa = 3.0", 'solvent_viscosity_Pa_s = "fit"')
-    assert [one.name for one in free.effects if one.free] == ["solvent_viscosity"]
 
 
 def test_a_solid_is_a_mode_that_does_not_relax_and_is_named():

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 import discover
@@ -34,12 +35,10 @@ time.sleep(60)
 
 @pytest.fixture
 def holder(tmp_path):
-    """Another process that works in a result folder."""
     out = tmp_path / "out"
     process = subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(out)], stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     yield process, out
     process.kill()
@@ -64,15 +63,14 @@ def test_two_processes_cannot_work_in_one_folder_and_a_killed_one_does_not_block
     assert not (out / LOCK_FILE).exists()
 
 
-def test_one_process_may_open_its_folder_twice_and_forgetting_it_unlocks(tmp_path):
+def test_one_process_may_open_its_folder_twice_and_forgetting_it_unlocks(tmp_path, monkeypatch):
     first = RunFolder(tmp_path, "one")
     second = RunFolder(tmp_path, "one")
     assert first._lock is second._lock
     del first, second
     assert not (tmp_path / LOCK_FILE).exists()
 
-
-def test_where_the_file_system_knows_no_locks_one_works_without(tmp_path, monkeypatch):
+    # where the file system knows no locks one works without
     class NoLocks:
         LOCK_EX = LOCK_NB = 0
 
@@ -85,26 +83,17 @@ def test_where_the_file_system_knows_no_locks_one_works_without(tmp_path, monkey
         lock_folder(tmp_path).release()
 
 
-def command(action):
-    import typer
-
-    app = typer.Typer()
-    app.command()(guarded(action))
-    return CliRunner().invoke(app, [])
-
-
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
 @pytest.mark.parametrize(
     ("step", "error", "code", "words"),
     [
-        ("write", FULL, 1, ["No space left on device", "part.json"]),
-        ("fsync", FULL, 1, ["No space left on device", "part.json"]),
-        ("replace", FULL, 1, ["No space left on device", "part.json"]),
+        *((step, FULL, 1, ["No space left on device", "part.json"])
+          for step in ("write", "fsync", "replace")),
         ("fsync", KeyboardInterrupt(), 130, ["run the same command again"]),
     ],
-)
+)  # fmt: skip
 @pytest.mark.parametrize("before", [{"x": 1}, None])
 def test_a_full_disk_and_an_interrupt_while_writing_are_one_line_and_keep_what_was_there(
     tmp_path, monkeypatch, step, error, code, words, before
@@ -124,7 +113,9 @@ def test_a_full_disk_and_an_interrupt_while_writing_are_one_line_and_keep_what_w
                 patch.setattr(os, step, stop)
             folder.save("part", {"x": 2})
 
-    result = command(work)
+    app = typer.Typer()
+    app.command()(guarded(work))
+    result = CliRunner().invoke(app, [])
     assert result.exit_code == code
     assert result.stderr.count("\n") == 1
     assert all(word in result.stderr for word in words)
@@ -167,7 +158,6 @@ def test_a_kill_at_any_moment_leaves_a_whole_file(tmp_path):
             stdout=subprocess.PIPE,
             text=True,
         )
-        assert process.stdout is not None
         process.stdout.readline()
         time.sleep(delay)
         process.kill()
@@ -182,36 +172,27 @@ def test_a_read_only_folder_is_refused_at_the_start(tmp_path, monkeypatch):
         raise PermissionError(errno.EACCES, "Permission denied", "x")
 
     # the tests may run as root, whom no mode stops
-    with monkeypatch.context() as patch:
-        patch.setattr("discover.study.atomic.os.access", lambda *_: False)
-        with pytest.raises(InputError, match=r"cannot be written to.*--out"):
-            RunFolder(tmp_path / "a", "one")
-    with monkeypatch.context() as patch:
-        patch.setattr("discover.study.atomic.os.open", forbidden)
-        with pytest.raises(InputError, match=r"Permission denied.*--out"):
-            RunFolder(tmp_path / "b", "one")
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "mkdir", forbidden)
-        with pytest.raises(InputError, match=r"Permission denied.*--out"):
-            RunFolder(tmp_path / "c", "one")
+    for what, name, stand_in, said in (
+        (os, "access", lambda *_: False, r"cannot be written to.*--out"),
+        (os, "open", forbidden, r"Permission denied.*--out"),
+        (Path, "mkdir", forbidden, r"Permission denied.*--out"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(what, name, stand_in)
+            with pytest.raises(InputError, match=said):
+                RunFolder(tmp_path / name, "one")
 
 
-def test_a_part_of_another_study_is_never_taken_over(tmp_path):
-    folder = RunFolder(tmp_path, "one")
+def test_a_part_of_another_study_or_edited_by_hand_is_never_taken_over(tmp_path):
+    folder = RunFolder(tmp_path / "a", "one")
     folder.save("part", {"x": 1})
-    (tmp_path / "state" / "study.json").unlink()  # as a crash of the disk might leave it
-    other = RunFolder(tmp_path, "two")
-    assert other.load("part") is None
-    assert RunFolder(tmp_path, "two").load("part") is None
-
-
-def test_a_part_edited_by_hand_is_computed_again(tmp_path):
-    folder = RunFolder(tmp_path, "one")
+    (tmp_path / "a" / "state" / "study.json").unlink()  # as a crash of the disk might leave it
+    for _ in range(2):
+        assert RunFolder(tmp_path / "a", "two").load("part") is None
+    folder = RunFolder(tmp_path / "b", "one")
     folder.save("part", {"x": 0.5, 2: [float("nan")], 10: None})
-    file = tmp_path / "state" / "part.json"
-    kept = folder.load("part")
-    assert kept is not None
-    assert kept["x"] == 0.5
+    assert folder.load("part")["x"] == 0.5
+    file = tmp_path / "b" / "state" / "part.json"
     file.write_text(file.read_text().replace("0.5", "0.6"))
     assert folder.load("part") is None
 
@@ -231,7 +212,6 @@ def test_no_result_can_depend_on_the_calendar():
 
 @pytest.fixture
 def umask():
-    """Sets the umask, and puts it back."""
     before = os.umask(0o022)
     yield os.umask
     os.umask(before)
@@ -280,9 +260,6 @@ def test_what_is_no_plain_file_is_not_replaced(tmp_path, make):
     assert os.lstat(tmp_path / "law.py")[:3] == before[:3]
     assert (tmp_path / "target").read_text() == "theirs"
     assert sorted(os.listdir(tmp_path)) == ["law.py", "target"]
-
-
-def test_a_device_is_not_replaced():
     with pytest.raises(InputError, match="no plain file"):
         write_text(os.devnull, "law")
 
@@ -303,7 +280,7 @@ def test_a_command_does_not_write_over_what_it_read_by_whatever_name(tmp_path, m
     write_text("start.csv", "by hand")  # outside of a command one knows what one does
 
 
-def test_what_a_command_read_may_be_gone_and_its_number_given_to_another(tmp_path, monkeypatch):
+def test_what_a_command_read_may_be_gone_and_results_of_ones_own_are_replaced_within_it(tmp_path):
     (tmp_path / "a").write_text("a")
     (tmp_path / "b").write_text("b")
     with inputs_kept():
@@ -311,9 +288,6 @@ def test_what_a_command_read_may_be_gone_and_its_number_given_to_another(tmp_pat
         os.replace(tmp_path / "a", tmp_path / "c")  # somebody moves it away: c is that file now
         write_text(tmp_path / "c", "new")
     assert (tmp_path / "c").read_text() == "new"
-
-
-def test_results_of_ones_own_are_replaced_within_a_command(tmp_path):
     with inputs_kept():
         for text in ("one", "two"):
             folder = RunFolder(tmp_path / "out", "fingerprint")

@@ -18,16 +18,17 @@ from tensor_library import LawTerm, LawTerms, build_library
 LIBRARY = tl.build_library(degree=2, closed_forms=("exp", "saturating"))
 
 
-def test_sizes_are_tensors_times_monomials_plus_closed_forms():
+def test_a_library_has_tensors_times_monomials_in_order_and_every_name_reads_back():
     assert len(tl.build_library()) == 8
     # seven invariants differ from zero in shear: 1 + 7 monomials up to degree one
     assert len(tl.build_library(degree=1)) == 8 * (1 + 7)
     assert len(LIBRARY) == 8 * (1 + 7 + 28) + 2
     assert len(tl.build_library(degree=1, invariants=tl.INVARIANT_NAMES)) == 8 * 9
-
-
-def test_every_name_reads_back_to_its_term():
     assert [tl.parse_term(name) for name in LIBRARY.names] == list(LIBRARY.terms)
+    names = ["sigma", "sigma.sigma", "tr(sigma)*sigma.sigma", "(exp(epsilon*tr(sigma))-1)*sigma"]
+    sizes = [tl.parse_term(name).complexity for name in names]
+    assert sizes == sorted(sizes)
+    assert sizes[0] < sizes[1] < sizes[2]
 
 
 @pytest.mark.parametrize(
@@ -53,28 +54,11 @@ def test_other_text_is_refused_and_never_evaluated(name):
         tl.parse_term(name)
 
 
-def test_library_evaluation_equals_term_by_term():
-    stress = jnp.array([1.2, -0.3, 0.2, 0.6])
-    rate = tl.rate_of_deformation(jnp.array(1.7))
-    inner = jnp.array([0.4, 0.3])
-    together = LIBRARY.evaluate(stress, rate, inner)
-    named = {"epsilon": inner[0], "kappa": inner[1]}
-    alone = jnp.stack([term.evaluate(stress, rate, named) for term in LIBRARY.terms])
-    np.testing.assert_allclose(together, alone, rtol=1e-12)
-
-
 def test_sympy_s_own_printers_know_our_trace():
     """A notebook shows expressions with them."""
     expression = tl.parse_term("tr(sigma)^2*gammadot").sympy()
     assert r"\operatorname{tr}\left(\sigma\right)^{2}" in sympy.latex(expression)
     assert "tr (σ)" in sympy.pretty(expression, use_unicode=True)
-
-
-def test_complexity_orders_simple_before_involved():
-    names = ["sigma", "sigma.sigma", "tr(sigma)*sigma.sigma", "(exp(epsilon*tr(sigma))-1)*sigma"]
-    sizes = [tl.parse_term(name).complexity for name in names]
-    assert sizes == sorted(sizes)
-    assert sizes[0] < sizes[1] < sizes[2]
 
 
 @pytest.mark.parametrize(
@@ -92,9 +76,16 @@ def test_a_wrong_description_is_refused_with_what_was_wanted(arguments, message)
         tl.build_library(**arguments)
 
 
-def test_a_library_takes_further_terms_once():
+def test_a_library_takes_terms_once_and_is_evaluated_term_by_term():
     names = tl.build_library(extra=["tr(sigma)*sigma", "sigma"]).names
     assert list(names) == [*tl.build_library().names, "tr(sigma)*sigma"]
+    stress = jnp.array([1.2, -0.3, 0.2, 0.6])
+    rate = tl.rate_of_deformation(jnp.array(1.7))
+    inner = jnp.array([0.4, 0.3])
+    together = LIBRARY.evaluate(stress, rate, inner)
+    named = {"epsilon": inner[0], "kappa": inner[1]}
+    alone = jnp.stack([term.evaluate(stress, rate, named) for term in LIBRARY.terms])
+    np.testing.assert_allclose(together, alone, rtol=1e-12)
 
 
 ROOT = Path(__file__).parents[2]
@@ -137,21 +128,18 @@ def test_a_term_comes_back_from_json_as_it_was(term):
     assert all(type(getattr(again, f.name)) is type(getattr(term, f.name)) for f in fields(term))
 
 
-def test_a_recovered_term_is_written_in_the_order_of_the_contract_and_whole():
+def test_a_recovered_term_is_written_whole_and_an_equation_keeps_what_a_law_has():
     keys = list(FOUND.to_json())
     assert keys[:5] == ["term", "coefficient", "coefficient_penalised", "ci95", "inner"]
     assert set(keys) == {one.name for one in fields(FOUND)}
     assert list(DECLARED.to_json()) == ["term", "coefficient", "inner"]
-
-
-def test_an_equation_keeps_of_a_recovered_term_what_a_law_has():
     equation = Equation((DECLARED, FOUND.in_law))
     written = equation_to_json(equation)
     assert [list(one) for one in written["terms"]] == [["term", "coefficient", "inner", "ci95"]] * 2
     assert equation_from_json(json.loads(json.dumps(written))) == equation
 
 
-def test_a_term_is_kept_in_its_canonical_spelling_with_the_defaults_put_in():
+def test_terms_are_canonical_and_a_sum_has_each_once_and_one_value_of_a_parameter():
     assert LawTerm("tr(sigma) * tr(sigma)*sigma", 0.1).term == "tr(sigma)^2*sigma"
     assert LawTerm(EXPONENTIAL, 1.0).inner == {"epsilon": 0.25}
     for term in (LawTerm, RecoveredTerm):
@@ -159,9 +147,6 @@ def test_a_term_is_kept_in_its_canonical_spelling_with_the_defaults_put_in():
             term(EXPONENTIAL, 1.0, {"kappa": 0.1})
         with pytest.raises(ValueError, match="Cannot read the term"):
             term("sigma.stress", 1.0)
-
-
-def test_a_sum_orders_inner_parameters_as_a_library_does():
     law = LawTerms.of([LawTerm(SATURATING, 0.2, {"kappa": 0.1}), FOUND])
     assert list(law.inner) == list(OF_DEGREE_ZERO.inner_names)
     assert law.values.tolist() == [0.2, 0.97, 0.31, 0.1]
@@ -174,9 +159,6 @@ def test_a_sum_orders_inner_parameters_as_a_library_does():
     assert law.at(law.values) == law
     assert LawTerms.of(law.terms) == law
     assert LawTerms.from_json(json.loads(json.dumps(law.to_json()))) == law
-
-
-def test_a_sum_has_each_term_once_and_one_value_of_an_inner_parameter():
     with pytest.raises(ValueError, match="stands there twice"):
         LawTerms.of([DECLARED, DECLARED])
     linear = EXPONENTIAL.replace("*sigma", "*gammadot")

@@ -1,12 +1,15 @@
-"""Equations on pages and in LaTeX: read by SymPy, drawn as written."""
+"""Every spelling of a law, on pages and in files, read by what would run or draw it."""
 
+import ast
+import json
 import xml.etree.ElementTree as ElementTree
 from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from readers import read_latex, value
+import sympy
+from readers import in_ufl, module_of, read_latex, rheotool_modes, sum_of_spelled, ufl_number, value
 from spelled_laws import (
     BOTH_SIGNS,
     EFFECTS,
@@ -19,7 +22,7 @@ from spelled_laws import (
 )
 
 from discover.comparison.comparison import Comparison
-from discover.equations import Equation, NamedPart, write_equation
+from discover.equations import Equation, NamedPart, equation_from_json, write_equation
 from discover.equations.spelling.markup import (
     SEPARATOR,
     law_element,
@@ -27,9 +30,129 @@ from discover.equations.spelling.markup import (
     sum_elements,
     term_element,
 )
+from discover.errors import InputError
 from discover.laws import LAWS
 from discover.report.comparison.report import equations_tex
 from tensor_library import CandidateTerm, LawTerm, parse_term
+
+
+def _by_python(equation):
+    module = module_of(write_equation(equation, "python"))
+    return [module["extra_term"](*state) for state in STATES]
+
+
+def _by_sympy_text(equation):
+    body = ast.parse(write_equation(equation, "sympy")).body
+    assigned = [n for n in body if isinstance(n, ast.Assign) and n.targets[0].id == "extra_term"]
+    code = compile(ast.Expression(assigned[0].value), "law", "eval")
+    found = []
+    for stress, rate in STATES:
+        s, d = sympy.Matrix(stress), sympy.Matrix(rate)
+        names = {"sympy": sympy, "unit": sympy.eye(3), "s": s, "d": d}
+        found.append(eval(code, names).evalf())
+    return found
+
+
+def _by_sympy_expression(equation):
+    expression = equation.sympy()
+    letters = ({"sigma": s, "gammadot": d, "I": np.eye(3)} for s, d in STATES)
+    return [value(expression, one, True) + np.zeros((3, 3)) for one in letters]
+
+
+def _by_json(equation):
+    """By the canonical spelling itself, read with the precedence of Python."""
+    content = json.loads(write_equation(equation, "json"))
+    assert equation_from_json(content) == equation
+    terms = [(term["term"], term["coefficient"], term["inner"]) for term in content["terms"]]
+    return [sum_of_spelled(terms, stress, rate) for stress, rate in STATES]
+
+
+@pytest.mark.parametrize("read", [_by_python, _by_sympy_text, _by_sympy_expression, _by_json])
+@pytest.mark.parametrize("name", BOTH_SIGNS)
+def test_the_text_of_every_term_law_and_effect_says_it(name, read):
+    spelled = BOTH_SIGNS[name]
+    assert agree(read(spelled.equation), spelled.extra)
+
+
+# the pieces of those of degree two are those of degree one, and powers
+SPELLED_IN_UFL = [
+    name for name in LIBRARY_LAWS if parse_term(name).degree < 2 or "^2" in name
+] + [*NAMED_LAWS]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SPELLED_IN_UFL)
+def test_the_ufl_text_of_terms_laws_and_effects_says_them(name):
+    pytest.importorskip("ufl")
+    spelled = (LIBRARY_LAWS | NAMED_LAWS)[name]
+    module = module_of(write_equation(spelled.equation, "ufl"))
+    stress, rate = STATES[1]
+    extra = module["extra_term"](in_ufl(stress), in_ufl(rate))
+    found = [[ufl_number(extra, (i, j)) for j in range(3)] for i in range(3)]
+    assert agree(found, spelled.extra[1])
+
+
+def _physical_rate(equation, stress, gradient):
+    """dτ/dt beside the convected terms, in Pa/s, of a one-mode equation without solvent."""
+    (modulus,), (time,) = equation.modulus, equation.relaxation_time
+    s, d = stress / modulus, time * (gradient + gradient.T)
+    terms = [(term.term, term.coefficient, dict(term.inner)) for term in equation.terms]
+    extra = sum_of_spelled(terms, s, d)
+    return modulus / time * (d - s - extra)
+
+
+def _rheotool_rate(text, stress, gradient):
+    """The same by rheoTool's sources."""
+    (mode,) = rheotool_modes(text)
+    return mode.rate(stress, gradient) - gradient @ stress - stress @ gradient.T
+
+
+TAKEN = {
+    "sigma": (0.2, -0.2), "gammadot": (0.2, -0.2), "sigma.sigma": (0.2,),
+    "sigma.gammadot+gammadot.sigma": (0.2,), "tr(sigma)*sigma": (0.2,),
+    "(exp(epsilon*tr(sigma))-1)*sigma": (1.0,),
+}  # fmt: skip
+
+
+def test_rheotool_takes_a_term_as_it_is_or_refuses_it_by_name():
+    """Every term of the library alone, with either sign."""
+    for index, name in enumerate(LIBRARY.names):
+        size = 1.0 if name.startswith("(exp") else 0.2
+        for coefficient in (size, -size):
+            terms = sum_of([index], [coefficient]).equation.terms
+            equation = Equation(terms, (7.0,), (0.4,))
+            if coefficient not in TAKEN.get(name, ()):
+                with pytest.raises(InputError) as refusal:
+                    write_equation(equation, "rheotool")
+                assert name in str(refusal.value)
+                continue
+            text = write_equation(equation, "rheotool")
+            for stress, rate in STATES:
+                state = (7.0 * stress, 0.5 * rate / 0.4)
+                wanted = _physical_rate(equation, *state)
+                assert agree(_rheotool_rate(text, *state), wanted), name
+
+
+_SLIP = LawTerm("sigma.gammadot+gammadot.sigma", 0.1)
+_EXPONENTIAL = LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3})
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        (_SLIP, LawTerm("tr(sigma)*sigma", 0.3)),
+        (_SLIP, _EXPONENTIAL),
+        (_SLIP, _EXPONENTIAL, LawTerm("gammadot", 0.3)),
+        (LawTerm("sigma", 0.5), LawTerm("sigma.sigma", 0.3), LawTerm("gammadot", 0.3)),
+        (LawTerm("sigma", 0.5), LawTerm("tr(sigma)*sigma", 0.3), _SLIP),
+    ],
+    ids=lambda terms: " and ".join(t.term for t in terms),
+)
+def test_rheotool_takes_these_terms_together(terms):
+    equation = Equation(terms, (7.0,), (0.4,))
+    text = write_equation(equation, "rheotool")
+    for stress, rate in STATES:
+        wanted = _physical_rate(equation, 7.0 * stress, rate)
+        assert agree(_rheotool_rate(text, 7.0 * stress, rate), wanted)
 
 
 def extra_by_latex(law, letters=()):
@@ -104,7 +227,7 @@ def test_a_sum_without_its_brackets_is_another_law():
     assert not agree(extra_by_latex(wrong), spelled.extra, 0.1)
 
 
-def test_a_second_value_and_a_negative_value_of_an_inner_parameter_are_read_back():
+def test_values_of_an_inner_parameter_are_read_back_also_where_nobody_gave_one():
     name = "(exp(epsilon*tr(sigma))-1)*sigma"
     for first, second in ((0.3, -0.2), (-0.2, 0.3), (2e-5, -3e-5)):
         terms = [LawTerm(name, 1.0, {"epsilon": e}) for e in (first, second)]
@@ -112,9 +235,6 @@ def test_a_second_value_and_a_negative_value_of_an_inner_parameter_are_read_back
             (np.expm1(first * np.trace(s)) + np.expm1(second * np.trace(s))) * s for s, _ in STATES
         ]
         assert agree(extra_by_latex(law_line(Equation(tuple(terms)))), np.array(wanted))
-
-
-def test_an_inner_parameter_that_nobody_gave_is_written_as_the_number_in_use():
     term = LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0)
     wanted = np.array([np.expm1(0.25 * np.trace(s)) * s for s, _ in STATES])
     assert agree(extra_by_latex(law_line(Equation((term,)))), wanted)
@@ -197,22 +317,16 @@ def test_every_tensor_is_bold_and_upright():
         assert {one.get("style") for one in tensors} == {"font-weight:bold"}
 
 
-def test_a_long_law_can_break_between_its_summands():
+def test_a_long_law_breaks_between_summands_spaced_by_signs_with_letters_for_missing_values():
     terms = sum_of([5, 6], [0.2, 0.1]).equation.terms
     # browsers break a line between elements, never within one
     assert law_element(terms, True).count("</math><wbr/><math") == len(terms)
-
-
-def test_a_sign_between_summands_is_spaced_as_one_and_a_first_one_is_not():
     terms = [LawTerm("sigma", -1.0), LawTerm("sigma.sigma", -1.5e-5)]
     first, second = elements(sum_elements(terms))
     # a sign is a prefix where it is the first of several in its row
     assert first[0][0].text == "−"
     assert [one.tag for one in second[0]][:2] == ["mrow", "mo"]
     assert drawn(sum_elements(terms)) == "−σ−1.5×10−5σ·σ"
-
-
-def test_letters_stand_where_no_value_is_given():
     name = "(tr(sigma)/(1+kappa*abs(tr(sigma))))*sigma"
     assert "κ" in drawn(term_element(name))
     assert "(−0.1)" in drawn(term_element(name, {"kappa": -0.1}))

@@ -1,7 +1,0 @@
-import pytest
-from user_packages import Workplace
-
-
-@pytest.fixture
-def workplace(tmp_path):
-    return Workplace(tmp_path)
