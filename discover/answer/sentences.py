@@ -290,7 +290,6 @@ def _place(answer: Any) -> str:
     if modes.is_plain(answer) and one.weissenberg is not None:
         slow = ""
         if one.deborah is not None and one.oscillates:
-            # what is slower than the fluid relaxes is nearly steady
             near = one.deborah[0] < _NEARLY_STEADY
             ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
             slow = f" and De = λω {ends}"

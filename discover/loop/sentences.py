@@ -212,9 +212,10 @@ def _by_geometry(result: Any) -> str:
     The fitted one that is missed most, by its own size.
     """
     by_run = (result.discrepancy or {}).get("by_run", {})
-    fitted = [record for record in result.records if not record.held_out]
-    run = max(_sheared(result) or fitted, key=lambda r: by_run.get(r.name, float(r.errors[-1])))
-    return f"Repeat {described(run)} with another gap, to separate instrument and fluid."
+    own = _sheared(result) or [record for record in result.records if not record.held_out]
+    worst = max(own, key=lambda r: by_run.get(r.name, float(r.errors[-1])), default=None)
+    run = "one run" if worst is None else described(worst)
+    return f"Repeat {run} with another gap, to separate instrument and fluid."
 
 
 def _telling_test(result: Any) -> str:
