@@ -84,16 +84,15 @@ def covariance_of_terms(search: SupportSearch, fit: Fit) -> Float[np.ndarray, "p
 def _penalised(search: SupportSearch, fit: Fit) -> dict[int, float]:
     """Return what the optimiser makes of the terms of a fit: thresholded or penalised."""
     model, support = search.model_at(fit), search.support(fit)
-    for solution in solve_sparse(search.optimizer, model.design, model.target, search.most):
-        if solution.support == support:
-            return {i: float(solution.coefficients[i]) for i in support}
+    swept = solve_sparse(search.optimizer, model.design, model.target, search.most)
+    if support in swept:
+        return {i: float(swept[support][i]) for i in support}
     # the optimiser left to itself stops elsewhere: what it says of these terms alone
     design = model.design[:, list(support)]
     alone = solve_sparse(search.optimizer, design, model.target, len(support))
     if not alone:
         return dict.fromkeys(support, 0.0)
-    densest = max(alone, key=lambda s: len(s.support)).coefficients
-    return dict(zip(support, map(float, densest), strict=True))
+    return dict(zip(support, map(float, alone[max(alone, key=len)]), strict=True))
 
 
 def _described(search: SupportSearch, fit: Fit) -> dict[str, Any]:

@@ -240,13 +240,13 @@ class SupportSearch(Search):
         if fit.jacobian is None:
             return []
         model, found = self.model_at(fit), []
-        for solution in solve_sparse(self.optimizer, model.design, model.target, self.most):
-            names = tuple(self.library.names[i] for i in solution.support)
+        for support in solve_sparse(self.optimizer, model.design, model.target, self.most):
+            names = tuple(self.library.names[i] for i in support)
             if len(names) > self.most or not self._is_a_law(names):
                 continue
             gone = [name for name in fit.names if name not in names]
             theta = self.problem.without(fit.theta, *gone)
-            for name, value in zip(names, model.solved(solution.support), strict=True):
+            for name, value in zip(names, model.solved(support), strict=True):
                 theta[self.problem.model.positions(name)[0]] = value
             found.append(self.fitter.start(names, theta, fit.linear))
         return [*found, *self.scored(fit)[: _MORE if fit.names else _FIRST]]
