@@ -73,24 +73,6 @@ _OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
 _START_UPS = (1.0, 3.0)
 
 
-@dataclass(frozen=True)
-class Histories:
-    """Shear flows with the times at which they are looked at.
-
-    `amplitude`: rms shear rate of each random history, shape (r,); these come first. `names`: of
-    the ordinary flows that follow.
-    """
-
-    runs: tuple[Run, ...]
-    amplitude: Float[np.ndarray, " r"]
-    names: tuple[str, ...] = ()
-
-    @property
-    def n_random(self) -> int:
-        """Number of random histories."""
-        return self.amplitude.size
-
-
 def longest_step(law: AbstractConstitutiveLaw) -> float:
     """Return the longest step, over λ, in which retracting chains are followed; else infinite."""
     if not law.retracts:
@@ -99,37 +81,34 @@ def longest_step(law: AbstractConstitutiveLaw) -> float:
 
 
 @cache
-def random_histories() -> Histories:
-    """Return band-limited random shear rates at several amplitudes, then ordinary flows.
+def random_histories() -> tuple[Run, ...]:
+    """Return runs of band-limited random shear rates at several amplitudes.
 
     Sums of six cosines with frequencies from 0.1 to 3 over eight relaxation times, at rms rates of
     0.3, 1, 2 and 3.
     """
     generator = np.random.default_rng(0)
-    protocols, amplitudes = [], []
-    for amplitude in _AMPLITUDES:
-        for _ in range(_EACH):
-            weights = generator.normal(size=_WAVES)
-            weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
-            protocols.append(
-                FlowProtocol(
-                    on_device(np.zeros(1)),
-                    on_device(np.zeros(1)),
-                    on_device(weights),
-                    on_device(generator.uniform(0.1, 3.0, _WAVES)),
-                    on_device(generator.uniform(0.0, 2.0 * np.pi, _WAVES)),
-                )
-            )
-            amplitudes.append(amplitude)
-    ordinary = {
+    times, none, runs = np.linspace(0.0, _DURATION, _SAMPLES), on_device(np.zeros(1)), []
+    for amplitude in np.repeat(_AMPLITUDES, _EACH):
+        weights = generator.normal(size=_WAVES)
+        weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
+        frequencies = generator.uniform(0.1, 3.0, _WAVES)
+        phases = generator.uniform(0.0, 2.0 * np.pi, _WAVES)
+        flow = FlowProtocol(none, none, *map(on_device, (weights, frequencies, phases)))
+        runs.append(bare_run(flow, times))
+    return tuple(runs)
+
+
+@cache
+def ordinary_flows() -> dict[str, Run]:
+    """Return oscillations and start-ups of shear by name, at the times of `random_histories`."""
+    flows = {
         f"oscillatory shear at Wi = {wi:g}, De = {de:g}": oscillatory_shear(wi, de)
         for wi, de in _OSCILLATIONS
     }
-    ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
-    protocols += ordinary.values()
+    flows |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
     times = np.linspace(0.0, _DURATION, _SAMPLES)
-    runs = tuple(bare_run(protocol, times) for protocol in protocols)
-    return Histories(runs, np.asarray(amplitudes), tuple(ordinary))
+    return {name: bare_run(flow, times) for name, flow in flows.items()}
 
 
 @dataclass(frozen=True)
@@ -147,13 +126,17 @@ class Difference:
 def stresses_in_histories(
     library: TermLibrary, laws: Sequence[LawTerms], base: AbstractConstitutiveLaw | None = None
 ) -> Float[np.ndarray, "laws runs n 3"]:
-    """Return σ12, N1 and N2 of laws in `random_histories`, beyond a known part, by default UCM."""
-    return stresses_of_laws(library, laws, random_histories().runs, base)
+    """Return σ12, N1 and N2 of laws in random histories, then ordinary flows.
+
+    `base`: the known part, by default UCM.
+    """
+    runs = [*random_histories(), *ordinary_flows().values()]
+    return stresses_of_laws(library, laws, runs, base)
 
 
 def differences(stresses: Float[np.ndarray, "laws runs n 3"]) -> list[Difference]:
     """Return how far each law is from the first in the random histories that the first survives."""
-    in_histories = stresses[:, : _EACH * len(_AMPLITUDES)]
+    in_histories = stresses[:, : len(random_histories())]
     return [difference(in_histories[0], other) for other in in_histories[1:]]
 
 
@@ -214,8 +197,7 @@ def separations(
     Oscillations and start-ups of shear, which need the fewest new instruments, then start-ups of
     uniaxial and planar extension. `stresses`: from `stresses_in_histories`.
     """
-    flows = random_histories()
-    names, shear = flows.names, stresses[:, flows.n_random :]
+    names, shear = ordinary_flows(), stresses[:, len(random_histories()) :]
     times = np.linspace(0.0, _DURATION, 161)
     starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]
     runs = [bare_run(in_flow(start_up(rate), kind), times) for kind, rate in starts]

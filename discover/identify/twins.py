@@ -256,7 +256,7 @@ class HiddenStresses:
 
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, over random histories that it survives."""
-    runs = side_by_side.random_histories().runs
+    runs = side_by_side.random_histories()
     protocols, times = [run.protocol for run in runs], [run.time for run in runs]
     step, longest = side_by_side.STRAIN_STEP, side_by_side.longest_step(law)
     grids = make_grids(protocols, times, strain_step=step, max_step=longest)
