@@ -8,11 +8,13 @@ import pandas as pd
 
 from discover.equations import Equation, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.learners.files import kept_in_files
 from discover.learners.lack_of_fit import LackOfFit
 from discover.summary_view import Estimate, NotebookView
 from tensor_library.law_terms import Interval, LawTerm, spell
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class RecoveredTerm(LawTerm):
     """Term of a recovered law: a `LawTerm`, and what the learner knows beyond it.
@@ -151,6 +153,7 @@ def _determined(
     return "yes, if the law is in the library"
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class LearnerResult(HasEquation, TermTables):
     """Learned law and how it was learned.

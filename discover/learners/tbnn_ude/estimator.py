@@ -15,7 +15,6 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
 from discover.learners.settings import default_library, law_below
@@ -97,7 +96,6 @@ class TBNNUDE(RunPrediction):
 
     learner = "tbnn_ude"
     _saved = (*RunPrediction._saved, "members_", "ensemble_fluids_", "ensemble_", "fitting_")
-    _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
     recipe: str | DefaultRecipe | PaperRecipe = "default"
     n_members: int = 3

@@ -23,8 +23,8 @@ SIMILAR = 1.05
 class Projection:
     """A sparse expansion of a network's extra term.
 
-    `misfit`: norm of what is left over that of the extra term, all four components, over the states
-        that training visited, each with the weight that the record gives its mode.
+    `misfit`: norm of what is left over that of the extra term, over the states that training
+    visited, each with the weight that the record gives its mode.
     """
 
     terms: tuple[LawTerm, ...]  # with least-squares coefficients; none of a law that adds nothing

@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
+from discover.learners.files import kept_in_files
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
 from discover.learners.tbnn_ude.session import (
@@ -142,6 +143,7 @@ _INITIAL_OUTPUT = 0.01
 trajectories diverge; the paper does not say how its network started."""
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class PaperRecipe:
     """Settings of the paper."""
