@@ -38,37 +38,29 @@ class ExactNotation(Notation):
         self.spelled = cache(super().spelled)  # a product of series is dear
 
     def contraction(self, tensors):
-        """Return the product of block matrices."""
         return reduce(_product, tensors)
 
     def sum(self, summands):
-        """Return the sum of tensors."""
         return tuple(reduce(add, each) for each in zip(*summands, strict=True))
 
     def trace(self, tensor):
-        """Return the trace of a tensor."""
         return tensor[0] + tensor[1] + tensor[2]
 
     def power(self, scalar, exponent):
-        """Return a power of a scalar."""
         return scalar**exponent
 
     def letter(self, name):
-        """Return the name of an inner parameter, by which `forms` has the value of its form."""
-        return name
+        return name  # by which `forms` has the value of its form
 
     def exponential(self, rate, trace):
-        """Return the value of the exponential form."""
         return self.forms[rate]
 
     saturating = exponential
 
     def function(self, expression, trace, parameter):
-        """Return the value of a closed form of a user's own."""
         return self.forms[parameter]
 
     def product(self, factors):
-        """Return the components of scalars times a tensor."""
         *scalars, (b11, b22, b33, b12, _) = factors
         for scalar in scalars:
             b11, b22, b33, b12 = scalar * b11, scalar * b22, scalar * b33, scalar * b12

@@ -115,19 +115,15 @@ class QuantityVerdict:
 
 @dataclass(frozen=True)
 class LawStructure(NotebookView):
-    """What the experiment can determine around one nominal law.
-
-    `exact`, `weak`: unseen directions, and the weakest of the others. `n_exact_with_N1`: exact ones
-    left if N1 were measured.
-    """
+    """What the experiment can determine around one nominal law."""
 
     name: str
     law: LawTerms  # its terms beyond the known part
     hidden: HiddenStresses  # what σ12 feels of the normal stresses
-    exact: tuple[Direction, ...]
-    weak: tuple[Direction, ...]
+    exact: tuple[Direction, ...]  # unseen
+    weak: tuple[Direction, ...]  # the weakest of the others
     quantities: tuple[QuantityVerdict, ...]  # verdicts on N1 and N2 from what is observed
-    n_exact_with_N1: int
+    n_exact_with_N1: int  # unseen directions that were left if N1 were measured as well
     N2_with_N1: Verdict  # verdict on N2 if N1 were measured as well
 
     @property
