@@ -76,7 +76,7 @@ def test_an_inertia_behind_the_motor_is_a_solvent_beside_the_mode():
     solvent = inertia / rise
     mode = (viscosity - solvent) * rate * -np.expm1(-TIMES / rise) + solvent * rate
     np.testing.assert_allclose(mode, viscosity * behind + inertia * change, rtol=1e-12)
-    from discover.identify.oil_twin import oil_twin
+    from discover.identify.twins import oil_twin
 
     found = oil_twin((viscosity - solvent) / rise, rise, solvent, [next(_runs_of_a_mode())])
     exact = {"viscosity": viscosity, "rise_time": rise, "inertia": inertia}
