@@ -291,8 +291,8 @@ def filled(
         variables = tuple(function.rates)
         letters = {name: f'constant["{name}"]' for name in function.constants}
         letters |= {name: name for name in (*function.where, *variables)}
-        defined, summands = function.spell(notation, letters)
-        rates = ", ".join(text for _, text in function.spell_rates(notation, letters))
+        defined, changes, summands = function.spell(notation, letters)
+        rates = ", ".join(text for _, text in changes)
         where = "".join(f"{indent}{name} = {value}\n" for name, value in defined)
         lines = summands + lines
         constants = _constants(equation) if constants is None else constants
