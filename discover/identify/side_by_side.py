@@ -1,6 +1,6 @@
 """Laws simulated side by side, and the histories that distinguish them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -15,6 +15,7 @@ from discover.forward.of_fluids import bare_run, observed
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.laws.expansion import expansion_of
 from discover.programs import on_device
+from discover.protocols.kinematics import FlowKind
 from discover.protocols.protocol import (
     FlowProtocol,
     in_flow,
@@ -156,10 +157,14 @@ def difference(
 
 
 _EXTENSION_RATES = (0.1, 0.3, 1.0)
-_QUANTITIES = ("sigma12", "N1", "N2")
 _VISIBLE = 1e-4
 
-_EXTENSION_QUANTITY = {"uniaxial": "σ11 − σ22", "planar": "σ22 − σ33"}
+_MEASURED: Mapping[FlowKind, Mapping[str, tuple[int, int]]] = {
+    "shear": {"sigma12": (0, 0), "N1": (1, 1), "N2": (2, 1)},
+    "uniaxial": {"σ11 − σ22": (1, 1)},
+    "planar": {"σ22 − σ33": (2, 1)},
+}
+"""What is measured in each flow: its column, and the column that it is relative to."""
 
 
 @dataclass(frozen=True)
@@ -197,55 +202,36 @@ def separations(
     Oscillations and start-ups of shear, which need the fewest new instruments, then start-ups of
     uniaxial and planar extension. `stresses`: from `stresses_in_histories`.
     """
-    names, shear = ordinary_flows(), stresses[:, len(random_histories()) :]
+    starts = [(kind, rate) for kind in ("uniaxial", "planar") for rate in _EXTENSION_RATES]
     times = np.linspace(0.0, _DURATION, 161)
-    starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]
     runs = [bare_run(in_flow(start_up(rate), kind), times) for kind, rate in starts]
     extension = stresses_of_laws(library, laws, runs, base, strain_step=np.inf)
-    return [
-        _best(
-            [
-                *_in_shear(names, shear[0], shear[i]),
-                *_in_extension(starts, extension[0], extension[i]),
-            ]
-        )
-        for i in range(1, len(laws))
-    ]
+    flows = [("shear", name) for name in ordinary_flows()]
+    flows += [(kind, f"{kind} extension at a rate of {rate:g}") for kind, rate in starts]
+    shear = stresses[:, len(random_histories()) :]
+    reference, *others = ([*a, *b] for a, b in zip(shear, extension, strict=True))
+    return [_best(flows, reference, other) for other in others]
 
 
-def _relative(a: np.ndarray, b: np.ndarray, scale: float) -> float | None:
-    if not np.all(np.isfinite(a)):
-        return None
-    if not np.all(np.isfinite(b)):
-        return np.inf
-    return rms(a - b) / scale if scale > 0 else None
-
-
-def _in_shear(names, reference, other):
-    for run, name in enumerate(names):
-        for kind, quantity in enumerate(_QUANTITIES):
-            scale = rms(reference[run, :, 1 if kind == 2 else kind])
-            value = _relative(reference[run, :, kind], other[run, :, kind], scale)
-            if value is not None:
-                yield Separation(name, quantity, value)
-
-
-def _in_extension(starts, reference, other):
-    for (kind, rate), a, b in zip(starts, reference, other, strict=True):
-        scale, which = rms(a[:, 1]), 1 if kind == "uniaxial" else 2
-        value = _relative(a[:, which], b[:, which], scale)
-        if value is not None:
-            flow = f"{kind} extension at a rate of {rate:g}"
-            yield Separation(flow, _EXTENSION_QUANTITY[kind], value)
-
-
-def _best(found: list[Separation]) -> tuple[Separation, ...]:
+def _best(
+    flows: Sequence[tuple[FlowKind, str]],
+    reference: Sequence[Float[np.ndarray, "_ 3"]],
+    other: Sequence[Float[np.ndarray, "_ 3"]],
+) -> tuple[Separation, ...]:
     """Return the largest difference in shear of each quantity and in each kind of extension."""
     best: dict[str, Separation] = {}
-    for one in found:
-        if one.difference < _VISIBLE:
-            continue
-        known = best.get(one.quantity)
-        if known is None or one.difference > known.difference:
-            best[one.quantity] = one
+    for (kind, name), a, b in zip(flows, reference, other, strict=True):
+        for quantity, (column, scale) in _MEASURED[kind].items():
+            value = _relative(a[:, column], b[:, column], rms(a[:, scale]))
+            known = best.get(quantity)
+            if value >= _VISIBLE and (known is None or value > known.difference):
+                best[quantity] = Separation(name, quantity, value)
     return tuple(best.values())
+
+
+def _relative(a: np.ndarray, b: np.ndarray, scale: float) -> float:
+    if not np.all(np.isfinite(a)):
+        return 0.0
+    if not np.all(np.isfinite(b)):
+        return np.inf
+    return rms(a - b) / scale if scale > 0 else 0.0
