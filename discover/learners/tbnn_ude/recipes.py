@@ -1,6 +1,6 @@
 """Recipes of training: the default, and that of the paper."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import equinox as eqx
@@ -38,7 +38,7 @@ def train_default(
     problem: TrainingProblem,
     key: PRNGKeyArray,
     linear_relaxation: bool,
-    recipe: DefaultRecipe | None,
+    recipe: DefaultRecipe,
     progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
 ) -> Trained:
@@ -48,7 +48,6 @@ def train_default(
     after every step with step, largest number of steps and misfit. `base_law`: known law below the
     network.
     """
-    recipe = recipe or DefaultRecipe()
     session = Session(problem, recipe, progress)
     # beside a network that is zero the steps would be the same, at three times the work
     start = without_network(linear_relaxation, base_law)
@@ -133,8 +132,6 @@ def _finish(
     )  # fmt: skip
 
 
-PaperProgress = Callable[[int, int, float], None]
-
 _CHUNK = 50
 """Iterations between two looks at the clock; each chunk is one compiled scan."""
 
@@ -215,8 +212,8 @@ def train_paper(
     problem: TrainingProblem,
     key: PRNGKeyArray,
     linear_relaxation: bool,
-    recipe: PaperRecipe | None,
-    progress: PaperProgress | None = None,
+    recipe: PaperRecipe,
+    progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
 ) -> tuple[TensorBasisNetwork, Float[np.ndarray, " m"]]:
     """Return a law trained by the paper's recipe, and the loss at every iteration.
@@ -225,7 +222,6 @@ def train_paper(
     weights. `linear_relaxation`: whether −σ is known. `progress`: called every 50 iterations with
     iteration, total and loss. `base_law`: known law to which the network is added.
     """
-    recipe = recipe or PaperRecipe()
     law = initial_law(key, recipe.width, linear_relaxation, None, base_law, _INITIAL_OUTPUT)
     network = law.network
     state = _adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))
