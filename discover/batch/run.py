@@ -8,13 +8,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from time import perf_counter
 
-from discover.batch.status import (
-    STATES,
-    SUMMARY_FILES,
-    BatchResult,
-    StudyStatus,
-    Summary,
-)
+from discover.batch.status import STATES, SUMMARY_FILES, BatchResult, StudyStatus, Summary
 from discover.batch.workers import run_in_workers, run_on_cluster
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError, plain_os_error

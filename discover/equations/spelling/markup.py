@@ -7,11 +7,7 @@ from xml.etree.ElementTree import tostring
 
 from discover.equations.parts import NamedPart
 from tensor_library import LawTerm, parse_term
-from tensor_library.notation import (
-    LatexNotation,
-    Notation,
-    greek_letter,
-)
+from tensor_library.notation import LatexNotation, Notation, greek_letter
 
 if TYPE_CHECKING:
     import sympy

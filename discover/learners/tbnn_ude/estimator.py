@@ -21,12 +21,7 @@ from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
-from discover.learners.tbnn_ude.problem import (
-    DefaultRecipe,
-    Trained,
-    TrainingProblem,
-    make_problem,
-)
+from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps

@@ -17,10 +17,7 @@ from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import check_library, default_library, law_below
 from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
-from discover.learners.tensor_sindy.search import (
-    SupportSearch,
-    library_problem,
-)
+from discover.learners.tensor_sindy.search import SupportSearch, library_problem
 from discover.progress import Progress, by_lines
 from tensor_library import LawTerms, TermLibrary
 
