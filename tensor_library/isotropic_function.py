@@ -70,24 +70,18 @@ class IsotropicFunction:
 
     def spell(
         self, notation: Notation, letters: Mapping[str, Any]
-    ) -> tuple[list[tuple[str, Any]], list[Any]]:
-        """Return what is defined on the way, by name, and the summands of h, in a notation.
+    ) -> tuple[list[tuple[str, Any]], list[tuple[str, Any]], list[Any]]:
+        """Return `where` and `rates` by name, and the summands of h, in a notation.
 
         `letters`: how constants, structure variables and defined scalars are written.
         """
-        known = _with_invariants(notation, letters)
-        defined = [(name, notation.scalar(one, known)) for name, one in self.where.items()]
+        known = {**letters, **{name: notation.spelled(name) for name in INVARIANT_NAMES}}
+        where, rates = (
+            [(name, notation.scalar(one, known)) for name, one in each.items()]
+            for each in (self.where, self.rates)
+        )
         summands = []
         for name, coefficient in self.coefficients.items():
             one = notation.scalar(coefficient, known, factor=True)
             summands.append(notation.product([one, notation.spelled(name)]))
-        return defined, summands
-
-    def spell_rates(self, notation: Notation, letters: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """Return the rate of change of each structure variable over 1/λ, as `spell` does."""
-        known = _with_invariants(notation, letters)
-        return [(name, notation.scalar(one, known)) for name, one in self.rates.items()]
-
-
-def _with_invariants(notation: Notation, letters: Mapping[str, Any]) -> dict[str, Any]:
-    return {**letters, **{name: notation.spelled(name) for name in INVARIANT_NAMES}}
+        return where, rates, summands

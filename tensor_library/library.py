@@ -58,11 +58,6 @@ class TermLibrary:
         return tuple(term.name for term in self.terms)
 
     @cached_property
-    def complexities(self) -> tuple[int, ...]:
-        """Complexity of each term."""
-        return tuple(term.complexity for term in self.terms)
-
-    @cached_property
     def forms(self) -> tuple[ClosedForm, ...]:
         """Closed forms that occur, in the order of their inner parameters."""
         used = {term.closed_form for term in self.terms}

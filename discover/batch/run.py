@@ -107,10 +107,7 @@ _TASKS = {"compare": run_compare, "close-loop": run_close_loop}
 def run_demo(
     out: Path, seed: int | None, overwrite: bool, progress: Progress | None
 ) -> dict[str, Path]:
-    """Run the demonstration and return its pages by title.
-
-    `out`: folder for the results; the comparison in it, the loop in its folder ``loop``.
-    """
+    """Run the demonstration into a folder, the loop in its ``loop``; return the pages by title."""
     whole = FollowedBy(progress, _DEMO_LOOP)
     studies = files("discover.batch") / "demo_studies"
     with as_file(studies / "comparison.toml") as comparison, as_file(studies / "loop.toml") as loop:

@@ -106,14 +106,8 @@ VISCOUS_HEATING = ViscousHeating(
 )  # fmt: skip
 
 
-class SofteningByWork(ViscousHeating):
-    """Relaxation times shortened by work, which the fluid forgets in a time t_r.
-
-    The equation is that of viscous heating; the cause is junctions or structure that work breaks.
-    """
-
-
-SOFTENING_BY_WORK = SofteningByWork(
+# the equation of viscous heating; the cause is junctions or structure that work breaks
+SOFTENING_BY_WORK = ViscousHeating(
     name="softening_by_work", complexity=3,
     parameters=(
         EffectParameter(

@@ -116,10 +116,7 @@ def parameters_of(name: str) -> dict[str, base.EffectParameter]:
 
 
 def spelled_on_a_page(names: Iterable[str]) -> dict[str, Spelled]:
-    """Return equations and letters of effects by name, each letter for one constant.
-
-    Without those that were given as objects.
-    """
+    """Return equations and letters of effects with a name, each letter for one constant."""
     found = []
     for name in dict.fromkeys(names):
         with suppress(InputError):
@@ -133,13 +130,10 @@ Written = Any
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """Effect that is part of the declared model.
-
-    `values`: of its parameters, in their units and order; None where one is to be fitted.
-    """
+    """Effect that is part of the declared model."""
 
     effect: base.AbstractEffect
-    values: tuple[float | None, ...]
+    values: tuple[float | None, ...]  # of its parameters, in their units; None of one to be fitted
 
     @property
     def name(self) -> str:

@@ -110,10 +110,7 @@ class Equation(NotebookView):
 
     @classmethod
     def of_fluid(cls, fluid: Fluid, parts: LawParts | None = None, **stated: Any) -> "Equation":
-        """Return the equation of a fluid, of which `parts` of the law may be known.
-
-        Raises InputError if the law has no name and is no sum of terms.
-        """
+        """Return the equation of a fluid; InputError if its law has no name and is no sum."""
         named, terms = parts or law_parts(fluid.law)
         return cls(
             terms, tuple(np.asarray(fluid.modulus).tolist()),

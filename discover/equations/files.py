@@ -38,10 +38,7 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
 
 
 def read_result(folder: str | Path) -> tuple[Any, str]:
-    """Return what the JSON file in a folder of results holds, and the name of the file.
-
-    Raises InputError if there is none, or it is no JSON.
-    """
+    """Return content and name of the JSON file in a folder of results; InputError if none."""
     path = Path(folder)
     if path.suffix == ".json":
         return read_json(path), path.name
@@ -193,10 +190,7 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
 
 
 def equation_from_json(content: object, where: str = "the law") -> Equation:
-    """Return the equation that `equation_to_json` wrote.
-
-    Raises InputError, naming the key, if something in it is missing, unknown or no number.
-    """
+    """Return the equation that `equation_to_json` wrote; InputError names a key that is wrong."""
     again = "Write the results again with --overwrite."
     try:
         law = validated(_Law, content, where)
@@ -231,11 +225,7 @@ def write_equation(
     density_kg_m3: float | None = None,
     tolerance: float | None = None,
 ) -> str:
-    """Return an equation as text.
-
-    Raises InputError if there is no such format, an option does not belong to it, or it lacks this
-    law.
-    """
+    """Return an equation as text; InputError if a format lacks the law, the option, or itself."""
     if form not in FORMATS:
         raise InputError(unknown_name("format", form, FORMATS))
     if form != "json":  # which holds what was found, and no more

@@ -26,32 +26,15 @@ from discover.words import percent_of
 class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     """One named law fitted to runs.
 
-    Attributes
-    ----------
-    law
-        Name of the law, as in `discover.laws`.
-    constants, covariance
-        What was fitted, and its covariance as fitted (moduli and times as logarithms), (p, p).
-    fluid
-        The fitted fluid.
-    effects
-        Values of fitted and declared effects, by name.
-    fits_to_the_noise, noise
-        Whether what the fit leaves of the runs is noise, and relative noise, mean over the runs.
-    discrepancy
-        Size of what the fit leaves besides; None where nothing is said.
-    records
-        The runs, measured and predicted, those held out among them.
-    model, theta
-        The forward model and its parameter vector.
-    written
-        The law as an equation; None where it cannot be written out.
-    title
-        Name of the data.
-    tolerance
-        Relative discrepancy that is good enough.
-    temperature_C
-        Temperature of the fitted runs; None where they have several or none, or are shifted.
+    `law`: its name, as in `discover.laws`. `constants`, `covariance`: what was fitted, and its
+    covariance as fitted (moduli and times as logarithms), (p, p). `effects`: values of fitted and
+    declared effects, by name. `fits_to_the_noise`, `noise`: whether what the fit leaves of the runs
+    is noise, and relative noise, mean over the runs. `discrepancy`: size of what the fit leaves
+    besides; None where nothing is said. `records`: the runs, measured and predicted, those held out
+    among them. `model`, `theta`: the forward model and its parameter vector. `written`: the law as
+    an equation; None where it cannot be written out. `title`: name of the data. `tolerance`:
+    relative discrepancy that is good enough. `temperature_C`: of the fitted runs; None where they
+    have several or none, or are shifted.
     """
 
     law: str

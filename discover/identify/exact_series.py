@@ -4,39 +4,72 @@ For polynomial histories γ̇(t), which come close to every history, the stress 
 a power series whose coefficients are polynomials. Laws with the same σ12(t) in every history have
 the same coefficients for random ones, order by order, without rounding [Fliess 1981, Bull. SMF 109,
 3].
-
-Coefficients are fractions where values matter, and residues modulo a large prime where only
-agreement does, with a chance of a false one of about 1e-17.
 """
 
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from itertools import count, islice, pairwise
+from functools import cache, reduce
+from itertools import count, islice
+from operator import add
 from typing import Any, no_type_check
 
-import numpy as np
-
-from tensor_library import INVARIANT_NAMES, TENSOR_NAMES, CandidateTerm, parse_term
-
-PRIME = 2**61 - 1
-"""Modulus of exact arithmetic in residues: a Mersenne prime of one machine word."""
+from tensor_library import parse_term
+from tensor_library.notation import Notation
 
 
-def residue(value: Fraction | int) -> int:
-    """Return a fraction modulo the prime."""
-    exact = Fraction(value)
-    return exact.numerator * pow(exact.denominator, -1, PRIME) % PRIME
+@no_type_check  # over any ring, and called too often for a check that could not fail
+class ExactNotation(Notation):
+    """Values at one state of simple shear, tensors stored as (11, 22, 33, 12, 21).
 
+    `stress`: σ11, σ22, σ33, σ12, `rate`: γ̇, over any ring with unit `one` and `zero`. `forms`:
+    values of closed forms by inner parameter; they are algebraically independent of polynomials, so
+    any number will do.
+    """
 
-Components = tuple[Any, Any, Any, Any]
-"""11, 22, 33, 12 of a symmetric tensor in simple shear, over any commutative ring."""
+    def __init__(self, stress, rate, one=1, zero=0, forms=None):
+        s11, s22, s33, s12 = stress
+        self.tensors = {
+            "I": (one, one, one, zero, zero),
+            "sigma": (s11, s22, s33, s12, s12),
+            "gammadot": (zero, zero, zero, rate, rate),
+        }
+        self.forms = forms or {}
+        self.spelled = cache(super().spelled)  # a product of series is dear
+
+    def contraction(self, tensors):
+        return reduce(_product, tensors)
+
+    def sum(self, summands):
+        return tuple(reduce(add, each) for each in zip(*summands, strict=True))
+
+    def trace(self, tensor):
+        return tensor[0] + tensor[1] + tensor[2]
+
+    def power(self, scalar, exponent):
+        return scalar**exponent
+
+    def letter(self, name):
+        return name  # by which `forms` has the value of its form
+
+    def exponential(self, rate, trace):
+        return self.forms[rate]
+
+    saturating = exponential
+
+    def function(self, expression, trace, parameter):
+        return self.forms[parameter]
+
+    def product(self, factors):
+        *scalars, (b11, b22, b33, b12, _) = factors
+        for scalar in scalars:
+            b11, b22, b33, b12 = scalar * b11, scalar * b22, scalar * b33, scalar * b12
+        return b11, b22, b33, b12
 
 
 @no_type_check
 def _product(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, ...]:
-    """Return a·b of block matrices stored as (11, 22, 33, 12, 21)."""
+    """Return a·b of block matrices."""
     a11, a22, a33, a12, a21 = first
     b11, b22, b33, b12, b21 = second
     return (
@@ -48,182 +81,62 @@ def _product(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, ...]:
     )
 
 
-@no_type_check
-def _word(word: str, tensors: Mapping[str, Sequence[Any]]) -> tuple[Any, ...]:
-    letters = word.split(".")
-    value = tuple(tensors[letters[0]])
-    for letter in letters[1:]:
-        value = _product(value, tensors[letter])
-    return value
-
-
-def exact_terms(
-    terms: Sequence[CandidateTerm], stress: Components, rate: Any, one: Any = 1, zero: Any = 0,
-    form_values: Mapping[str, Any] | None = None,
-) -> list[Components]:  # fmt: skip
-    """Return the components of every term at one state.
-
-    `stress`: σ11, σ22, σ33, σ12, `rate`: γ̇, over any ring with unit `one` and `zero`.
-    `form_values`: of each closed form, by key; algebraically independent of polynomials, so any
-    number will do.
-    """
-    s11, s22, s33, s12 = stress
-    tensors = {
-        "I": (one, one, one, zero, zero),
-        "sigma": (s11, s22, s33, s12, s12),
-        "gammadot": (zero, zero, zero, rate, rate),
-    }
-
-    # only what the terms need: a product of series is dear
-    used = {
-        name
-        for term in terms
-        for name, power in zip(INVARIANT_NAMES, term.powers, strict=True)
-        if power
-    }
-    invariants = {
-        name: sum(_word(name.removeprefix("tr(").removesuffix(")"), tensors)[:3], zero)
-        for name in used
-    }
-    bases = {
-        name: _sum([_word(word, tensors) for word in name.split("+")])
-        for name in dict.fromkeys(TENSOR_NAMES[term.tensor] for term in terms)
-    }
-    values: list[Components] = []
-    for term in terms:
-        scalar = one
-        for name, power in zip(INVARIANT_NAMES, term.powers, strict=True):
-            for _ in range(power):
-                scalar = scalar * invariants[name]
-        if term.closed_form is not None:
-            if form_values is None:
-                raise ValueError(f"The term {term.name} is not a polynomial; give form_values.")
-            scalar = scalar * form_values[term.closed_form]
-        b11, b22, b33, b12, _ = bases[TENSOR_NAMES[term.tensor]]
-        values.append((scalar * b11, scalar * b22, scalar * b33, scalar * b12))
-    return values
-
-
-@no_type_check
-def _sum(words: list[tuple[Any, ...]]) -> tuple[Any, ...]:
-    total = words[0]
-    for word in words[1:]:
-        total = tuple(a + b for a, b in zip(total, word, strict=True))
-    return total
-
-
 DEFAULT_ORDER = 9
 _HISTORIES = 2
 
-
-@no_type_check  # over any ring, and called too often for a check that could not fail
-@dataclass(frozen=True)
-class _Series:
-    """A power series in time up to an order that products keep; over residues if `modular`."""
-
-    values: tuple[Any, ...]
-    modular: bool = False
-
-    def __add__(self, other: "_Series") -> "_Series":
-        total = tuple(a + b for a, b in zip(self.values, other.values, strict=True))
-        return _Series(total, self.modular)
-
-    def __mul__(self, other: "_Series") -> "_Series":
-        n = len(self.values)
-        product: list[Any] = [0] * n
-        for i, a in enumerate(self.values):
-            if a:
-                for j in range(n - i):
-                    product[i + j] += a * other.values[j]
-        if self.modular:
-            product = [value % PRIME for value in product]
-        return _Series(tuple(product), self.modular)
+UNKNOWN = "c"
+"""A coefficient of a law that is solved for."""
 
 
 def stress_series(
-    coefficients: Mapping[str, Fraction | int],
-    rate: Sequence[Fraction | int],
-    order: int,
-    linear_relaxation: bool = True,
-    modular: bool = False,
-) -> list[tuple[Any, Any, Any, Any]]:
-    """Return the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, up to an order.
+    law: Mapping[str, Any], rate: Sequence[Fraction | int], linear_relaxation: bool = True
+) -> Iterator[list[Any]]:
+    """Yield the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, each dearer than the last.
 
-    `coefficients`: term → c of dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term; closed forms raise
-    ValueError. `rate`: of γ̇(t) = Σ rate[k] tᵏ. `modular`: whether to return residues modulo
-    `PRIME`.
+    `law`: term → c of dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, without closed forms; c may be
+    `UNKNOWN`, in which what is yielded is a polynomial of SymPy. `rate`: of γ̇(t) = Σ rate[k] tᵏ.
     """
-    return list(islice(_growing(coefficients, rate, linear_relaxation, modular), order + 1))
+    from sympy import QQ, ring
 
+    series, t, unknown = ring(f"t,{UNKNOWN}", QQ)
 
-def _growing(
-    coefficients: Mapping[str, Fraction | int],
-    rate: Sequence[Fraction | int],
-    linear_relaxation: bool,
-    modular: bool,
-) -> Iterator[tuple[Any, Any, Any, Any]]:
-    """Yield the Taylor coefficients of `stress_series` one by one, each dearer than the last."""
-    number = residue if modular else Fraction
-    terms = [parse_term(name) for name in coefficients]
-    values = [number(value) for value in coefficients.values()]
-    shear_rate: list[Any] = []
-    stress: list[tuple[Any, Any, Any, Any]] = [(number(0), number(0), number(0), number(0))]
+    def exact(value: Any) -> Any:
+        return unknown if value == UNKNOWN else QQ(*Fraction(value).as_integer_ratio())
+
+    def coefficient(value: Any, k: int) -> Any:
+        return series.from_dict({(0, c): each for (power, c), each in value.items() if power == k})
+
+    terms = [(exact(value), parse_term(name)) for name, value in law.items()]
+    shear_rate, stress = series.zero, [series.zero] * 4
     for k in count():
-        yield stress[k]
-        shear_rate.append(number(rate[k] if k < len(rate) else 0))
-        zero = _Series((number(0),) * (k + 1), modular)
-        one = _Series((number(1), *zero.values[1:]), modular)
-        s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress), modular) for i in range(4))
-        g = _Series(tuple(shear_rate), modular)
-        slope = [2 * (g * s12).values[k], number(0), number(0), shear_rate[k] + (g * s22).values[k]]
+        yield [coefficient(component, k) for component in stress]
+        shear_rate += exact(rate[k] if k < len(rate) else 0) * t**k
+        notation = ExactNotation(stress, shear_rate, series.one, series.zero)
+        grown = 2 * shear_rate * stress[3], shear_rate + shear_rate * stress[1]
+        slope = [grown[0], series.zero, series.zero, grown[1]]
         if linear_relaxation:
-            slope = [value - old for value, old in zip(slope, stress[k], strict=True)]
-        evaluated = exact_terms(terms, (s11, s22, s33, s12), g, one, zero)
-        for c, components in zip(values, evaluated, strict=True):
-            slope = [v - c * part.values[k] for v, part in zip(slope, components, strict=True)]
-        inverse = number(Fraction(1, k + 1))
-        s11, s22, s33, s12 = (
-            value * inverse % PRIME if modular else value * inverse for value in slope
-        )
-        stress.append((s11, s22, s33, s12))
+            slope = [value - old for value, old in zip(slope, stress, strict=True)]
+        for c, term in terms:
+            components = term.spell(notation)
+            slope = [value - c * one for value, one in zip(slope, components, strict=True)]
+        further = (coefficient(value, k) * t ** (k + 1) * QQ(1, k + 1) for value in slope)
+        stress = [old + new for old, new in zip(stress, further, strict=True)]
 
 
-@dataclass(frozen=True)
-class Agreement:
-    """Order to which two laws agree in every shear history.
-
-    `sigma12`, `N1`, `N2`: first order at which they differ, or None up to `order`.
-    """
-
-    order: int  # order to which the series were computed
-    sigma12: int | None
-    N1: int | None
-    N2: int | None
-
-
-def compare_series(
+def same_shear_stress(
     first: Mapping[str, Fraction | int],
     second: Mapping[str, Fraction | int],
     order: int = DEFAULT_ORDER,
     linear_relaxation: bool = True,
-) -> Agreement:
-    """Return where the Taylor series of two laws part, over random histories."""
+) -> bool:
+    """Return whether σ12 of two laws agrees to an order of time, in random histories."""
     generator = random.Random(2)
-    parts: dict[str, int | None] = {"sigma12": None, "N1": None, "N2": None}
     for _ in range(_HISTORIES):
         rate = [Fraction(generator.randint(-9, 9), generator.randint(1, 9)) for _ in range(order)]
-        a = stress_series(first, rate, order, linear_relaxation, modular=True)
-        b = stress_series(second, rate, order, linear_relaxation, modular=True)
-        for k, (s, t) in enumerate(zip(a, b, strict=True)):
-            for name, same in (
-                ("sigma12", s[3] == t[3]),
-                ("N1", (s[0] - s[1] - t[0] + t[1]) % PRIME == 0),
-                ("N2", (s[1] - s[2] - t[1] + t[2]) % PRIME == 0),
-            ):
-                known = parts[name]
-                if not same and (known is None or k < known):
-                    parts[name] = k
-    return Agreement(order, parts["sigma12"], parts["N1"], parts["N2"])
+        both = (stress_series(law, rate, linear_relaxation) for law in (first, second))
+        if any(a[3] != b[3] for a, b in islice(zip(*both, strict=True), order + 1)):
+            return False
+    return True
 
 
 def solve_for_coefficient(
@@ -239,74 +152,26 @@ def solve_for_coefficient(
     roots are the candidates; a rational root is exact, and then later orders have to agree. `kept`:
     other terms of the law sought. Returns candidates, and whether they are proved.
     """
+    from sympy import Poly, Symbol
+
     generator = random.Random(3)
     rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
-    rest = dict(kept or {})
-
-    # residues are enough to see at which order the term enters, and whether it enters too late;
-    # fractions are needed at that order only, and no later one at all
-    laws = (target, rest, {**rest, term: 1}, {**rest, term: 2})
-    series = (_growing(law, rate, linear_relaxation, modular=True) for law in laws)
-    for k, states in zip(range(order + 1), zip(*series, strict=True), strict=False):
-        wanted, *trial = (state[3] for state in states)
-        if trial[0] == trial[1] == trial[2]:
-            if trial[0] != wanted:
+    law = {**(kept or {}), term: UNKNOWN}
+    both = (stress_series(each, rate, linear_relaxation) for each in (target, law))
+    for wanted, found in islice(zip(*both, strict=True), order + 1):
+        excess = found[3] - wanted[3]
+        if excess.is_ground:
+            if excess:
                 return []
             continue
-        aim = shear_at(k, target, rate, linear_relaxation)
-        samples = [
-            shear_at(k, {**rest, term: value}, rate, linear_relaxation) - aim
-            for value in range(_DEGREE + 1)
-        ]
-        polynomial = _interpolate(samples)
+        polynomial = Poly({(c,): value for (_, c), value in excess.items()}, Symbol(UNKNOWN))
         candidates = []
-        for root in _real_roots(polynomial):
-            fraction = Fraction(root).limit_denominator(10**6)
-            if sum(a * fraction**power for power, a in enumerate(polynomial)) != 0:
-                candidates.append((root, False))
+        for root in sorted(set(polynomial.real_roots()), key=abs):
+            if not root.is_Rational:
+                candidates.append((float(root), False))
                 continue
-            law = {**rest, term: fraction}
-            if compare_series(target, law, order, linear_relaxation).sigma12 is None:
-                candidates.append((float(fraction), True))
+            proved = {**law, term: Fraction(root.p, root.q)}
+            if same_shear_stress(target, proved, order, linear_relaxation):
+                candidates.append((float(root), True))
         return candidates
     return []
-
-
-_DEGREE = 3
-"""Degree in its coefficient with which a term first enters σ12, at most."""
-
-
-def shear_at(
-    order: int,
-    coefficients: Mapping[str, Fraction | int],
-    rate: Sequence[Fraction | int],
-    linear_relaxation: bool,
-) -> Fraction:
-    """Return one Taylor coefficient of σ12."""
-    return stress_series(coefficients, rate, order, linear_relaxation)[order][3]
-
-
-def _interpolate(samples: Sequence[Fraction]) -> list[Fraction]:
-    """Return the polynomial with these values at 0, 1, 2, ..., constant first."""
-    differences, binomial = list(samples), [Fraction(1)]  # Newton's, times x over k
-    polynomial = [Fraction(0)] * len(samples)
-    for k in range(len(samples)):
-        for power, value in enumerate(binomial):
-            polynomial[power] += differences[0] * value
-        differences = [later - value for value, later in pairwise(differences)]
-        shifted = zip([0, *binomial], [*binomial, 0], strict=True)
-        binomial = [(lower - k * value) / Fraction(k + 1) for lower, value in shifted]
-    while polynomial and polynomial[-1] == 0:
-        polynomial.pop()
-    return polynomial
-
-
-def _real_roots(polynomial: Sequence[Fraction]) -> list[float]:
-    """Return the real roots of a polynomial, smallest first."""
-    if len(polynomial) < 2:
-        return []
-    if len(polynomial) == 2:
-        return [float(-polynomial[0] / polynomial[1])]
-    roots = np.roots([float(value) for value in reversed(polynomial)])
-    real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
-    return sorted(real, key=abs)

@@ -73,15 +73,11 @@ class PhysicsReport:
 
 @dataclass(frozen=True)
 class Seen:
-    """A fluid along flows, and in oscillations up to beyond the box of training.
-
-    `weissenberg`, `deborah`: largest rate and frequency of training, times the mean relaxation
-    time: the box beyond which the law extrapolates.
-    """
+    """A fluid along flows, and in oscillations up to beyond the box of training."""
 
     fluid: Fluid
-    weissenberg: float
-    deborah: float
+    weissenberg: float  # largest rate of training times the mean relaxation time
+    deborah: float  # largest frequency, likewise: the law extrapolates beyond the two
     along: physics_flows.Trajectories  # the flows asked for
     beyond: physics_flows.Cycles
     in_cycles: physics_flows.Trajectories  # these
@@ -92,10 +88,7 @@ def see(
     fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]],
     weissenberg: float, deborah: float,
 ) -> Seen:  # fmt: skip
-    """Return what a fluid does along flows, and what its checks need beside.
-
-    `times`: of samples in s. `weissenberg`, `deborah`: as of `Seen`.
-    """
+    """Return what a fluid does along flows at `times` in s, and what its checks need beside."""
     beyond = physics_flows.cycles(
         physics_flows.time_scale(fluid),
         [weissenberg * factor for factor in _BOX_FACTORS],

@@ -72,10 +72,7 @@ _STATES = 1024
 def trajectories(
     fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]]
 ) -> Trajectories:
-    """Return what a fluid does along flows from their starts on.
-
-    `times`: of samples in s.
-    """
+    """Return what a fluid does along flows from their starts on, at `times` in s."""
     runs = [followed(fluid, bare_run(*pair)) for pair in zip(protocols, times, strict=True)]
     steps = {
         "strain_step": _STRAIN_STEP,
@@ -152,16 +149,12 @@ def _energy(law, stress, gradient):
 
 @dataclass(frozen=True)
 class Cycles:
-    """Three cycles of oscillation from rest, over a grid of Weissenberg and Deborah numbers.
+    """Three cycles of oscillation from rest, over a grid of Weissenberg and Deborah numbers."""
 
-    `weissenberg`, `deborah`: of each, with the mean relaxation time. `protocols`, `times`: the
-    flows, and their samples in s.
-    """
-
-    weissenberg: Float[np.ndarray, " flows"]
-    deborah: Float[np.ndarray, " flows"]
+    weissenberg: Float[np.ndarray, " flows"]  # with the mean relaxation time
+    deborah: Float[np.ndarray, " flows"]  # likewise
     protocols: tuple[FlowProtocol, ...]
-    times: tuple[Float[np.ndarray, " n"], ...]
+    times: tuple[Float[np.ndarray, " n"], ...]  # of samples, in s
 
     @property
     def names(self) -> tuple[str, ...]:

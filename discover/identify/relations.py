@@ -11,10 +11,14 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.exact_series import PRIME, exact_terms
+from discover.identify.exact_series import ExactNotation
 from discover.words import percent_of
 from tensor_library.law_terms import spell
 from tensor_library.library import TermLibrary
+
+_PRIME = 2**61 - 1
+"""Modulus of exact arithmetic in residues: a Mersenne prime of one machine word. A false agreement
+has a chance of about 1e-17."""
 
 _LARGEST_INTEGER = 10**6
 _FRESH_STATES = 5
@@ -75,7 +79,7 @@ def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     generator = random.Random(0)
     n = len(library)
     states = [_random_state(generator, library) for _ in range(n + _FRESH_STATES)]
-    values = [exact_terms(library.terms, s, g, form_values=forms) for s, g, forms in states]
+    values = [_values(library, *state) for state in states]
     found: list[TermRelation] = []
     known: list[list[int]] = []
     for touches, components in _COMPONENTS_SEEN.items():
@@ -100,8 +104,14 @@ def _random_state(generator: random.Random, library: TermLibrary):
     return (
         (number(), number(), number(), number()),
         number(),
-        {form.name: number() for form in library.forms},
+        {name: number() for name in library.inner_names},
     )
+
+
+def _values(library: TermLibrary, stress, rate, forms) -> list[tuple[int, ...]]:
+    """Return the components 11, 22, 33, 12 of every term at one state."""
+    notation = ExactNotation(stress, rate, forms=forms)
+    return [term.spell(notation) for term in library.terms]
 
 
 def _reduced(rows: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[int]]:
@@ -109,8 +119,8 @@ def _reduced(rows: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[int]]:
     n = len(rows[0])
     echelon, pivots, idle = np.zeros((0, n), dtype=object), [], 0
     for given in rows:
-        row = np.array(given, dtype=object) % PRIME
-        row = (row - row[pivots] @ echelon) % PRIME
+        row = np.array(given, dtype=object) % _PRIME
+        row = (row - row[pivots] @ echelon) % _PRIME
         leads = np.flatnonzero(row)
         if not len(leads):
             idle += 1
@@ -118,8 +128,8 @@ def _reduced(rows: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[int]]:
                 break  # rows come from random states: the rank is reached
             continue
         idle, lead = 0, int(leads[0])
-        row = row * pow(row[lead], -1, PRIME) % PRIME
-        echelon = np.vstack([(echelon - np.outer(echelon[:, lead], row)) % PRIME, row])
+        row = row * pow(row[lead], -1, _PRIME) % _PRIME
+        echelon = np.vstack([(echelon - np.outer(echelon[:, lead], row)) % _PRIME, row])
         pivots.append(lead)
         if len(pivots) == n:
             break
@@ -132,7 +142,7 @@ def _null_space(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     vectors = []
     for free in sorted(set(range(len(rows[0]))) - set(pivots)):
         residues = np.eye(1, len(rows[0]), free, dtype=int)[0].astype(object)
-        residues[pivots] = -echelon[:, free] % PRIME
+        residues[pivots] = -echelon[:, free] % _PRIME
         exact = [part for value in residues[::-1] if (part := _rational(value)) is not None]
         if len(exact) < len(residues):
             continue
@@ -148,7 +158,7 @@ def _null_space(rows: Sequence[Sequence[int]]) -> list[list[int]]:
 def _rational(residue: int) -> Fraction | None:
     """Return the small fraction with this residue   [Wang 1981, SYMSAC, 212]."""
     limit = 2**29
-    old, new, old_t, new_t = PRIME, residue, 0, 1
+    old, new, old_t, new_t = _PRIME, residue, 0, 1
     while new > limit:
         quotient = old // new
         old, new = new, old - quotient * new
@@ -169,8 +179,8 @@ def feels_33(library: TermLibrary) -> bool:
         (s11, s22, s33, s12), rate, forms = _random_state(generator, library)
         # a closed form is a function of tr σ, so it changes with σ33
         other = {name: value + 1 for name, value in forms.items()}
-        here = exact_terms(library.terms, (s11, s22, s33, s12), rate, form_values=forms)
-        there = exact_terms(library.terms, (s11, s22, s33 + 1, s12), rate, form_values=other)
+        here = _values(library, (s11, s22, s33, s12), rate, forms)
+        there = _values(library, (s11, s22, s33 + 1, s12), rate, other)
         for a, b in zip(here, there, strict=True):
             if (a[0], a[1], a[3]) != (b[0], b[1], b[3]):
                 return True

@@ -1,6 +1,6 @@
 """Laws simulated side by side, and the histories that distinguish them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -15,12 +15,8 @@ from discover.forward.of_fluids import bare_run, observed
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.laws.expansion import expansion_of
 from discover.programs import on_device
-from discover.protocols.protocol import (
-    FlowProtocol,
-    in_flow,
-    oscillatory_shear,
-    start_up,
-)
+from discover.protocols.kinematics import FlowKind
+from discover.protocols.protocol import FlowProtocol, in_flow, oscillatory_shear, start_up
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 from tensor_library import LawTerms, TermLibrary, parse_term
@@ -73,24 +69,6 @@ _OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
 _START_UPS = (1.0, 3.0)
 
 
-@dataclass(frozen=True)
-class Histories:
-    """Shear flows with the times at which they are looked at.
-
-    `amplitude`: rms shear rate of each random history, shape (r,); these come first. `names`: of
-    the ordinary flows that follow.
-    """
-
-    runs: tuple[Run, ...]
-    amplitude: Float[np.ndarray, " r"]
-    names: tuple[str, ...] = ()
-
-    @property
-    def n_random(self) -> int:
-        """Number of random histories."""
-        return self.amplitude.size
-
-
 def longest_step(law: AbstractConstitutiveLaw) -> float:
     """Return the longest step, over λ, in which retracting chains are followed; else infinite."""
     if not law.retracts:
@@ -99,37 +77,34 @@ def longest_step(law: AbstractConstitutiveLaw) -> float:
 
 
 @cache
-def random_histories() -> Histories:
-    """Return band-limited random shear rates at several amplitudes, then ordinary flows.
+def random_histories() -> tuple[Run, ...]:
+    """Return runs of band-limited random shear rates at several amplitudes.
 
     Sums of six cosines with frequencies from 0.1 to 3 over eight relaxation times, at rms rates of
     0.3, 1, 2 and 3.
     """
     generator = np.random.default_rng(0)
-    protocols, amplitudes = [], []
-    for amplitude in _AMPLITUDES:
-        for _ in range(_EACH):
-            weights = generator.normal(size=_WAVES)
-            weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
-            protocols.append(
-                FlowProtocol(
-                    on_device(np.zeros(1)),
-                    on_device(np.zeros(1)),
-                    on_device(weights),
-                    on_device(generator.uniform(0.1, 3.0, _WAVES)),
-                    on_device(generator.uniform(0.0, 2.0 * np.pi, _WAVES)),
-                )
-            )
-            amplitudes.append(amplitude)
-    ordinary = {
+    times, none, runs = np.linspace(0.0, _DURATION, _SAMPLES), on_device(np.zeros(1)), []
+    for amplitude in np.repeat(_AMPLITUDES, _EACH):
+        weights = generator.normal(size=_WAVES)
+        weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
+        frequencies = generator.uniform(0.1, 3.0, _WAVES)
+        phases = generator.uniform(0.0, 2.0 * np.pi, _WAVES)
+        flow = FlowProtocol(none, none, *map(on_device, (weights, frequencies, phases)))
+        runs.append(bare_run(flow, times))
+    return tuple(runs)
+
+
+@cache
+def ordinary_flows() -> dict[str, Run]:
+    """Return oscillations and start-ups of shear by name, at the times of `random_histories`."""
+    flows = {
         f"oscillatory shear at Wi = {wi:g}, De = {de:g}": oscillatory_shear(wi, de)
         for wi, de in _OSCILLATIONS
     }
-    ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
-    protocols += ordinary.values()
+    flows |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
     times = np.linspace(0.0, _DURATION, _SAMPLES)
-    runs = tuple(bare_run(protocol, times) for protocol in protocols)
-    return Histories(runs, np.asarray(amplitudes), tuple(ordinary))
+    return {name: bare_run(flow, times) for name, flow in flows.items()}
 
 
 @dataclass(frozen=True)
@@ -147,13 +122,17 @@ class Difference:
 def stresses_in_histories(
     library: TermLibrary, laws: Sequence[LawTerms], base: AbstractConstitutiveLaw | None = None
 ) -> Float[np.ndarray, "laws runs n 3"]:
-    """Return σ12, N1 and N2 of laws in `random_histories`, beyond a known part, by default UCM."""
-    return stresses_of_laws(library, laws, random_histories().runs, base)
+    """Return σ12, N1 and N2 of laws in random histories, then ordinary flows.
+
+    `base`: the known part, by default UCM.
+    """
+    runs = [*random_histories(), *ordinary_flows().values()]
+    return stresses_of_laws(library, laws, runs, base)
 
 
 def differences(stresses: Float[np.ndarray, "laws runs n 3"]) -> list[Difference]:
     """Return how far each law is from the first in the random histories that the first survives."""
-    in_histories = stresses[:, : _EACH * len(_AMPLITUDES)]
+    in_histories = stresses[:, : len(random_histories())]
     return [difference(in_histories[0], other) for other in in_histories[1:]]
 
 
@@ -173,10 +152,14 @@ def difference(
 
 
 _EXTENSION_RATES = (0.1, 0.3, 1.0)
-_QUANTITIES = ("sigma12", "N1", "N2")
 _VISIBLE = 1e-4
 
-_EXTENSION_QUANTITY = {"uniaxial": "σ11 − σ22", "planar": "σ22 − σ33"}
+_MEASURED: Mapping[FlowKind, Mapping[str, tuple[int, int]]] = {
+    "shear": {"sigma12": (0, 0), "N1": (1, 1), "N2": (2, 1)},
+    "uniaxial": {"σ11 − σ22": (1, 1)},
+    "planar": {"σ22 − σ33": (2, 1)},
+}
+"""What is measured in each flow: its column, and the column that it is relative to."""
 
 
 @dataclass(frozen=True)
@@ -214,56 +197,36 @@ def separations(
     Oscillations and start-ups of shear, which need the fewest new instruments, then start-ups of
     uniaxial and planar extension. `stresses`: from `stresses_in_histories`.
     """
-    flows = random_histories()
-    names, shear = flows.names, stresses[:, flows.n_random :]
+    starts = [(kind, rate) for kind in ("uniaxial", "planar") for rate in _EXTENSION_RATES]
     times = np.linspace(0.0, _DURATION, 161)
-    starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]
     runs = [bare_run(in_flow(start_up(rate), kind), times) for kind, rate in starts]
     extension = stresses_of_laws(library, laws, runs, base, strain_step=np.inf)
-    return [
-        _best(
-            [
-                *_in_shear(names, shear[0], shear[i]),
-                *_in_extension(starts, extension[0], extension[i]),
-            ]
-        )
-        for i in range(1, len(laws))
-    ]
+    flows = [("shear", name) for name in ordinary_flows()]
+    flows += [(kind, f"{kind} extension at a rate of {rate:g}") for kind, rate in starts]
+    shear = stresses[:, len(random_histories()) :]
+    reference, *others = ([*a, *b] for a, b in zip(shear, extension, strict=True))
+    return [_best(flows, reference, other) for other in others]
 
 
-def _relative(a: np.ndarray, b: np.ndarray, scale: float) -> float | None:
-    if not np.all(np.isfinite(a)):
-        return None
-    if not np.all(np.isfinite(b)):
-        return np.inf
-    return rms(a - b) / scale if scale > 0 else None
-
-
-def _in_shear(names, reference, other):
-    for run, name in enumerate(names):
-        for kind, quantity in enumerate(_QUANTITIES):
-            scale = rms(reference[run, :, 1 if kind == 2 else kind])
-            value = _relative(reference[run, :, kind], other[run, :, kind], scale)
-            if value is not None:
-                yield Separation(name, quantity, value)
-
-
-def _in_extension(starts, reference, other):
-    for (kind, rate), a, b in zip(starts, reference, other, strict=True):
-        scale, which = rms(a[:, 1]), 1 if kind == "uniaxial" else 2
-        value = _relative(a[:, which], b[:, which], scale)
-        if value is not None:
-            flow = f"{kind} extension at a rate of {rate:g}"
-            yield Separation(flow, _EXTENSION_QUANTITY[kind], value)
-
-
-def _best(found: list[Separation]) -> tuple[Separation, ...]:
+def _best(
+    flows: Sequence[tuple[FlowKind, str]],
+    reference: Sequence[Float[np.ndarray, "_ 3"]],
+    other: Sequence[Float[np.ndarray, "_ 3"]],
+) -> tuple[Separation, ...]:
     """Return the largest difference in shear of each quantity and in each kind of extension."""
     best: dict[str, Separation] = {}
-    for one in found:
-        if one.difference < _VISIBLE:
-            continue
-        known = best.get(one.quantity)
-        if known is None or one.difference > known.difference:
-            best[one.quantity] = one
+    for (kind, name), a, b in zip(flows, reference, other, strict=True):
+        for quantity, (column, scale) in _MEASURED[kind].items():
+            value = _relative(a[:, column], b[:, column], rms(a[:, scale]))
+            known = best.get(quantity)
+            if value >= _VISIBLE and (known is None or value > known.difference):
+                best[quantity] = Separation(name, quantity, value)
     return tuple(best.values())
+
+
+def _relative(a: np.ndarray, b: np.ndarray, scale: float) -> float:
+    if not np.all(np.isfinite(a)):
+        return 0.0
+    if not np.all(np.isfinite(b)):
+        return np.inf
+    return rms(a - b) / scale if scale > 0 else 0.0

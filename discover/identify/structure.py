@@ -20,7 +20,7 @@ from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics, with_cheap_tangents
 from discover.forward.of_fluids import pieces_in_time
-from discover.identify.exact_series import compare_series
+from discover.identify.exact_series import same_shear_stress
 from discover.identify.relations import (
     Direction,
     TermRelation,
@@ -115,19 +115,15 @@ class QuantityVerdict:
 
 @dataclass(frozen=True)
 class LawStructure(NotebookView):
-    """What the experiment can determine around one nominal law.
-
-    `exact`, `weak`: unseen directions, and the weakest of the others. `n_exact_with_N1`: exact ones
-    left if N1 were measured.
-    """
+    """What the experiment can determine around one nominal law."""
 
     name: str
     law: LawTerms  # its terms beyond the known part
     hidden: HiddenStresses  # what σ12 feels of the normal stresses
-    exact: tuple[Direction, ...]
-    weak: tuple[Direction, ...]
+    exact: tuple[Direction, ...]  # unseen
+    weak: tuple[Direction, ...]  # the weakest of the others
     quantities: tuple[QuantityVerdict, ...]  # verdicts on N1 and N2 from what is observed
-    n_exact_with_N1: int
+    n_exact_with_N1: int  # unseen directions that were left if N1 were measured as well
     N2_with_N1: Verdict  # verdict on N2 if N1 were measured as well
 
     @property
@@ -318,8 +314,8 @@ def _finite(direction: Direction, law: LawTerms, base) -> Direction:
     for name, value in direction.coefficients.items():
         step = _FINITE_STEP * Fraction(value).limit_denominator(1000)
         there[name] = there.get(name, Fraction(0)) + step
-    agreement = compare_series(here, there, _FINITE_ORDER, base.linear_relaxation)
-    return replace(direction, at_any_size=agreement.sigma12 is None)
+    same = same_shear_stress(here, there, _FINITE_ORDER, base.linear_relaxation)
+    return replace(direction, at_any_size=same)
 
 
 def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdict:

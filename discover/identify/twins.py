@@ -11,19 +11,18 @@ from fractions import Fraction
 from typing import Any, Literal
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.forward.fluids import dynamics_of_fluid
-from discover.forward.grid import make_grids
-from discover.forward.stepping import follow
+from discover.dataset import Run
+from discover.effects.registry import make_effect
+from discover.forward import make_batch
+from discover.forward.of_fluids import components
 from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
-from discover.programs import compiled
-from discover.protocols.protocol import stack_protocols
+from discover.programs import compiled, on_device
 from discover.summary_view import NotebookView
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
@@ -255,22 +254,37 @@ class HiddenStresses:
 
 
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
-    """Return which normal stresses σ12 feels in a law, over random histories that it survives."""
-    runs = side_by_side.random_histories().runs
-    protocols, times = [run.protocol for run in runs], [run.time for run in runs]
+    """Return which normal stresses σ12 feels in a law, at its states in random histories.
+
+    With the Jacobians A of dσ/dt at any of these, changes reach σ12 along e₁₂, e₁₂·A, e₁₂·A·A′ and
+    so on: the rows of an observability matrix.
+    """
+    runs, fluid = side_by_side.random_histories(), Fluid.dimensionless(law)
     step, longest = side_by_side.STRAIN_STEP, side_by_side.longest_step(law)
-    grids = make_grids(protocols, times, strain_step=step, max_step=longest)
-    arrived = np.asarray(_arrivals(law, stack_protocols(protocols), grids))
-    usable = np.all(np.isfinite(arrived), axis=(1, 2))
-    rows = arrived[usable].reshape(-1, 3)
-    triangular = np.linalg.qr(rows, mode="r") if len(rows) else np.zeros((3, 3))
-    _, values, right = np.linalg.svd(triangular)
+    states = np.concatenate(components([fluid], make_batch(runs, step, longest=longest))[0])
+    rates = np.concatenate([run.rate for run in runs])
+    usable = np.all(np.isfinite(states), axis=1)
+    jacobians = np.asarray(_jacobians(law, on_device(states[usable]), on_device(rates[usable])))
+    jacobians = jacobians / np.max(np.abs(jacobians), initial=1e-300)
+    felt_rows, known = np.eye(1, states.shape[1], 3), 0
+    while len(felt_rows) > known:
+        known = len(felt_rows)
+        further = (felt_rows @ jacobians).reshape(-1, states.shape[1])
+        rows = np.linalg.qr(np.concatenate([felt_rows, further]), mode="r")
+        _, values, right = np.linalg.svd(rows)
+        felt_rows = right[: len(values)][values > _ZERO * values[0]]
+    _, values, right = np.linalg.svd(np.concatenate([felt_rows[:, :3], np.zeros((3, 3))]))
     unfelt = _readable(right[values <= _ZERO * max(values[0], 1e-300)])
     felt = {
         name: bool(np.all(np.abs(unfelt @ difference) < 1e-8))
         for name, difference in _DIFFERENCES.items()
     }
     return HiddenStresses(unfelt, felt)
+
+
+@compiled
+def _jacobians(law, states, rates):
+    return jax.vmap(jax.jacfwd(law.stress_rate))(states, rates)
 
 
 def _readable(rows: np.ndarray) -> np.ndarray:
@@ -289,21 +303,24 @@ def _readable(rows: np.ndarray) -> np.ndarray:
     return np.array(basis).reshape(-1, 3)
 
 
-@compiled
-def _arrivals(law, protocols, grids):
-    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0) at the samples, (runs, n, 3)."""
+def oil_twin(
+    modulus: float, time: float, solvent: float, runs: Sequence[Run]
+) -> dict[str, float] | None:
+    """Return viscosity, rise time and inertia that record in runs what a Maxwell mode does.
 
-    def one(protocol, grid):
-        alone = dynamics_of_fluid(Fluid.dimensionless(law), protocol)
-
-        def slope(state, rate):
-            stress, changes = state[:, 0], state[:, 1:]
-            value, push = jax.linearize(lambda s: alone.slope(s, rate), stress)
-            along = jax.vmap(push, in_axes=1, out_axes=1)(changes)
-            return jnp.concatenate([value[:, None], along], axis=1)
-
-        beside = alone._replace(slope=slope, columns=3)
-        start = beside.rest().at[:3, 1:, 0].set(jnp.eye(3))
-        return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
-
-    return jax.vmap(one)(protocols, grids)
+    The rate behind a motor follows the commanded one, t_m dγ̇ₘ/dt + γ̇ₘ = γ̇, so that η γ̇ₘ is the
+    stress of a mode with λ = t_m and G = η/t_m. An inertia I adds I dγ̇ₘ/dt = (I/t_m) (γ̇ − γ̇ₘ),
+    which is that of a solvent beside a smaller mode. None where N1, extension or a rate measured at
+    the tool tells the two apart, and where no motor is that slow. All in units of Pa and s;
+    `solvent`: the viscosity beside the mode.
+    """
+    found = {"viscosity": modulus * time + solvent, "rise_time": time, "inertia": solvent * time}
+    rise, inertia = (
+        make_effect(name).parameters[0] for name in ("rate_rise_time", "instrument_inertia")
+    )
+    told = any(
+        (run.flow, run.quantity, run.protocol.control) != ("shear", "sigma12", "rate")
+        or run.rate_is_measured
+        for run in runs
+    )
+    return None if told or time > rise.high or solvent * time > inertia.high else found

@@ -1,48 +1,46 @@
-"""Estimators in files: gzipped JSON, with what made them, and back, without pickle."""
+"""Estimators in files: gzipped JSON, with what made them, without pickle."""
 
 import dataclasses
 import gzip
 import hashlib
 import json
 import os
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from discover._version import __version__
 from discover.dataset.run import Run
-from discover.dataset.tables.table import read_bytes
 from discover.equations import law_parts
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.each_mode import LawOfEachMode, law_of_each_mode
+from discover.laws.each_mode import LawOfEachMode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS, make_law, name_of
+from discover.laws.registry import LAWS, name_of
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.plain_numbers import parse_json
-from tensor_library import TermLibrary, parse_term
+from tensor_library import TermLibrary
 
 FORMAT, VERSION = "discover estimator", 3
-_LARGEST = 2**28
-"""Bytes of a file, and of what it unpacks to, at most: an estimator of megabytes is a large one."""
+KIND = "kind"
 
-_ZIP = b"PK"
-"""Begins what forms before the third were."""
+KINDS: dict[str, type] = {"fluid": Fluid, "expansion": LibraryExpansion}
+"""Dataclasses that a file may hold beside numbers, text, arrays, laws, libraries, and lists and
+dictionaries of them, by their names in files."""
 
-_DAMAGES = (LookupError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
+NETWORK_FIELDS = ("constants", "network_mask", "invariant_scale", "linear_relaxation", "base")
 
-_KIND = "kind"
+_Kept = TypeVar("_Kept", bound=type)
 
-Types = Sequence[type]
-"""Dataclasses that a file may hold beside numbers, text, arrays, laws, fluids, libraries, and lists
-and dictionaries of them."""
+
+def kept_in_files(made: _Kept) -> _Kept:
+    """Let files hold a dataclass; loading an estimator imports its module."""
+    KINDS[made.__name__] = made
+    return made
 
 
 def write_estimator(
@@ -50,7 +48,6 @@ def write_estimator(
     learner: str,
     parameters: Mapping[str, Any],
     fitted: Mapping[str, Any],
-    types: Types,
 ) -> Path:
     """Write an estimator to a file, replacing it whole or not at all.
 
@@ -66,8 +63,8 @@ def write_estimator(
         "version": VERSION,
         "made_by": f"discover {__version__}",
         "learner": learner,
-        "parameters": {k: plain(v, types, f"The parameter {k!r}") for k, v in parameters.items()},
-        "fitted": {k: plain(v, types, f"The attribute {k!r}") for k, v in fitted.items()},
+        "parameters": {k: plain(v, f"The parameter {k!r}") for k, v in parameters.items()},
+        "fitted": {k: plain(v, f"The attribute {k!r}") for k, v in fitted.items()},
     }
     partial = path.with_name(path.name + ".partial")
     partial.write_bytes(gzip.compress(json.dumps(content, ensure_ascii=False).encode()))
@@ -75,84 +72,15 @@ def write_estimator(
     return path
 
 
-class EstimatorFile:
-    """Content of a file written by `write_estimator`.
-
-    Raises InputError if there is no such file, or it is something else, damaged, or of another
-    version.
-    """
-
-    def __init__(self, path: str | Path):
-        self._path = Path(path)
-        if os.path.isdir(self._path):
-            raise InputError(f"{path} is a folder. Give the file that estimator.save(path) wrote.")
-        # a pipe or a device has no end, and is refused here
-        packed = read_bytes(self._path, str(self._path), "Check the path.", largest=_LARGEST)
-        content: Any = None
-        if packed.startswith(b"\x1f\x8b"):  # of gzip
-            try:
-                content = parse_json(_unpacked(packed))
-            except (ValueError, zlib.error) as error:
-                raise self.damaged(error) from None
-        elif packed.startswith(_ZIP) and b"estimator.json" in packed:
-            content = {"format": FORMAT, "version": "1 or 2", "made_by": "an earlier version"}
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise InputError(
-                f"{self._path} is not a complete estimator file. Give a file that "
-                "estimator.save(path) wrote; a law by itself is read elsewhere."
-            )
-        if content.get("version") != VERSION:
-            raise InputError(
-                f"{self._path} was written by {content.get('made_by', 'another version')} in the "
-                f"form {content.get('version')}; this is discover {__version__}, which reads the "
-                f"form {VERSION}. Use that version, or fit again."
-            )
-        self._content = content
-        self.learner = str(content.get("learner"))
-
-    def read(self, types: Types) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the parameters and the fitted attributes, by name."""
-        try:
-            parameters, fitted = (
-                {name: restored(value, types) for name, value in self._content[part].items()}
-                for part in ("parameters", "fitted")
-            )
-        except InputError as error:  # a law that is not registered here
-            raise InputError(f"{self._path}: {error}") from None
-        except _DAMAGES as error:
-            raise self.damaged(error) from None
-        return parameters, fitted
-
-    def damaged(self, error: Exception) -> InputError:
-        """Return the error of a file whose content is not as it was written."""
-        first = (str(error).splitlines() or [""])[0][:200]
-        return InputError(
-            f"{self._path} is damaged ({type(error).__name__}: {first}). Copy it again, or fit "
-            "again."
-        )
-
-
-def _unpacked(packed: bytes) -> bytes:
-    """Return what gzip packed, by its checksum; no more than an estimator has is unpacked."""
-    unpacker = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
-    content = unpacker.decompress(packed, _LARGEST)
-    if not unpacker.eof:
-        raise ValueError(f"it ends early, or unpacks to more than {_LARGEST / 1e6:.0f} MB")
-    return content
-
-
-def plain(value: Any, types: Types, where: str) -> Any:
-    """Return a value as JSON has it; `restored` undoes it.
-
-    `where`: what the value is, for the InputError if it cannot be written.
-    """
+def plain(value: Any, where: str) -> Any:
+    """Return a value as JSON has it; InputError, which says `where`, if a file cannot hold it."""
 
     def all_of(items: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: plain(item, types, where) for name, item in items.items()}
+        return {name: plain(item, where) for name, item in items.items()}
 
     def of_fields(kind: str) -> dict[str, Any]:
         values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-        return {_KIND: kind, "fields": all_of(values)}
+        return {KIND: kind, "fields": all_of(values)}
 
     if value is None or isinstance(value, bool | str | int | float):
         return value
@@ -161,42 +89,39 @@ def plain(value: Any, types: Types, where: str) -> Any:
     if isinstance(value, np.ndarray | jax.Array):
         array = np.asarray(value)
         return {
-            _KIND: "array",
+            KIND: "array",
             "dtype": array.dtype.str,
             "shape": list(array.shape),
             "numbers": array.ravel().tolist(),
         }
     if isinstance(value, list | tuple):
-        items = [plain(item, types, where) for item in value]
-        return {_KIND: "list" if isinstance(value, list) else "tuple", "items": items}
+        items = [plain(item, where) for item in value]
+        return {KIND: "list" if isinstance(value, list) else "tuple", "items": items}
     if isinstance(value, Mapping):
-        return {_KIND: "dict", "items": all_of({str(key): item for key, item in value.items()})}
+        return {KIND: "dict", "items": all_of({str(key): item for key, item in value.items()})}
     if isinstance(value, TermLibrary):
-        return {_KIND: "library", "terms": list(value.names)}
-    if isinstance(value, Fluid):
-        return of_fields("fluid")
-    if isinstance(value, LibraryExpansion):
-        return of_fields("expansion")
+        return {KIND: "library", "terms": list(value.names)}
+    for kind, made in KINDS.items():
+        if type(value) is made:
+            return of_fields(kind)
     if isinstance(value, TensorBasisNetwork):
         network = value.network
         weights = jax.tree.leaves(eqx.filter(network, eqx.is_array))
         return {
-            _KIND: "network",
+            KIND: "network",
             # of constants alone there is none
             "width": 0 if network is None else network.width_size,
             "depth": 0 if network is None else network.depth,
-            "weights": plain(weights, types, where),
-            "fields": all_of({name: getattr(value, name) for name in _NETWORK_FIELDS}),
+            "weights": plain(weights, where),
+            "fields": all_of({name: getattr(value, name) for name in NETWORK_FIELDS}),
         }
     if isinstance(value, LawOfEachMode):
         part, _ = law_parts(value)  # it has a name, or is refused
         assert part is not None
         constants = [dict(one) for one in part.constants]
-        return {_KIND: "law_of_each_mode", "name": part.law, "constants": constants}
+        return {KIND: "law_of_each_mode", "name": part.law, "constants": constants}
     if isinstance(value, AbstractConstitutiveLaw):
         return _named_law(value, where)
-    if type(value) in types:
-        return of_fields(type(value).__name__)
     raise InputError(
         f"{where} is a {type(value).__name__}, which a file cannot hold. Use a value of plain "
         "numbers, text or arrays, or keep the estimator with pickle."
@@ -212,70 +137,10 @@ def _named_law(law: AbstractConstitutiveLaw, where: str) -> dict[str, Any]:
         )
     name, values = found
     relaxes = law.linear_relaxation
-    return {_KIND: "named_law", "name": name, "values": values, "linear_relaxation": relaxes}
+    return {KIND: "named_law", "name": name, "values": values, "linear_relaxation": relaxes}
 
 
-_NETWORK_FIELDS = ("constants", "network_mask", "invariant_scale", "linear_relaxation", "base")
-
-
-def restored(content: Any, types: Types) -> Any:
-    """Return the value that `plain` wrote.
-
-    Raises one of `_DAMAGES` where it is damaged.
-    """
-    if not isinstance(content, dict):
-        return content
-    kind = content[_KIND]
-    if kind == "array":
-        dtype = np.dtype(content["dtype"])
-        if dtype.kind not in "biuf":  # of texts one alone may fill the memory
-            raise ValueError(f"an array of {dtype}")
-        return np.array(content["numbers"], dtype).reshape(content["shape"])
-    if kind in ("list", "tuple"):
-        items = [restored(item, types) for item in content["items"]]
-        return items if kind == "list" else tuple(items)
-    if kind == "dict":
-        return {key: restored(item, types) for key, item in content["items"].items()}
-    if kind == "library":
-        return TermLibrary(tuple(parse_term(name) for name in content["terms"]))
-    if kind == "named_law":
-        law = make_law(content["name"], content["values"])
-        relaxes = bool(content["linear_relaxation"])
-        if law.linear_relaxation == relaxes:
-            return law
-        return dataclasses.replace(law, linear_relaxation=relaxes)
-    if kind == "law_of_each_mode":
-        return law_of_each_mode([make_law(content["name"], one) for one in content["constants"]])
-    fields = {key: restored(item, types) for key, item in content["fields"].items()}
-    if kind == "fluid":
-        return Fluid(**fields)
-    if kind in ("network", "expansion"):
-        for name, value in fields.items():
-            fields[name] = jnp.asarray(value) if isinstance(value, np.ndarray) else value
-        if kind == "expansion":
-            return LibraryExpansion(**fields)
-        weights = restored(content["weights"], types)
-        return _network(weights, int(content["width"]), int(content["depth"]), fields)
-    return {one.__name__: one for one in types}[kind](**fields)
-
-
-def _network(
-    weights: Sequence[np.ndarray], width: int, depth: int, fields: dict[str, Any]
-) -> TensorBasisNetwork:
-    if not width and not depth and not weights:
-        return TensorBasisNetwork(network=None, **fields)
-    # a network is not made larger than the weights that the file has for it
-    if len(weights) != 2 * (depth + 1) or len(weights[0]) != width:
-        raise ValueError("weights do not fit the network")
-    made = TensorBasisNetwork.initialise(jax.random.key(0), width, depth)
-    dynamic, static = eqx.partition(made.network, eqx.is_array)
-    leaves, structure = jax.tree.flatten(dynamic)
-    if [w.shape for w in weights] != [leaf.shape for leaf in leaves]:
-        raise ValueError("weights do not fit the network")
-    network = eqx.combine(structure.unflatten(map(jnp.asarray, weights)), static)
-    return TensorBasisNetwork(network=network, **fields)
-
-
+@kept_in_files
 @dataclasses.dataclass(frozen=True)
 class Provenance:
     """Data an estimator was fitted to; a saved one holds this in their place."""

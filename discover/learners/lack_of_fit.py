@@ -16,6 +16,7 @@ from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Search
 from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.laws.expansion import LibraryExpansion, in_shared_form
+from discover.learners.files import kept_in_files
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import noise_beside
 from discover.words import percent_of
@@ -29,15 +30,12 @@ _SLOW = 0.6
 """Correlation of noise from which on a smooth misfit of up to three times its size may hide."""
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class LackOfFit:
-    """What a law leaves of the records that it was learned from.
+    """What a law leaves of the records that it was learned from."""
 
-    `verdict`: ``"explained"`` if it is noise, ``"no_signal"`` if the records hold nothing that a
-        law could be told from, ``"unexplained"`` otherwise.
-    """
-
-    verdict: FitVerdict
+    verdict: FitVerdict  # "no_signal" if the records hold nothing that a law could be told from
     misfit: float  # root-mean-square residual over rms measurement, mean over runs
     noise: float  # relative noise of the records, mean over runs
     lag_one_correlation: float  # of that noise, from sample to sample

@@ -30,12 +30,9 @@ class LearningTask:
 
 @dataclass(frozen=True)
 class NamedLearner:
-    """Learner of a user's own.
+    """Learner of a user's own."""
 
-    `learn`: from a `LearningTask` to a `LearnerResult` whose law holds the known one.
-    """
-
-    learn: Callable[[LearningTask], LearnerResult]
+    learn: Callable[[LearningTask], LearnerResult]  # the law of its result holds the known one
     title: str  # name for readers
 
 

@@ -8,25 +8,20 @@ import pandas as pd
 
 from discover.equations import Equation, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.learners.files import kept_in_files
 from discover.learners.lack_of_fit import LackOfFit
 from discover.summary_view import Estimate, NotebookView
 from tensor_library.law_terms import Interval, LawTerm, spell
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class RecoveredTerm(LawTerm):
     """Term of a recovered law: a `LawTerm`, and what the learner knows beyond it.
 
-    Attributes
-    ----------
-    coefficient, coefficient_penalised
-        Refitted without penalty; and of the penalised problem that selected the term, if any.
-    latex
-        The term without its coefficient.
-    inner_ci95
-        95 % intervals of the inner parameters.
-    inner_at_one
-        Inner parameters (value, low, high) if the coefficient is one, where it may be.
+    `coefficient`: refitted without penalty. `coefficient_penalised`: of the penalised problem that
+    selected the term, if any. `latex`: the term without its coefficient. `inner_ci95`: of the inner
+    parameters. `inner_at_one`: these (value, low, high) if the coefficient is one, where it may be.
     """
 
     coefficient_penalised: float | None = field(default=None, kw_only=True)
@@ -151,34 +146,21 @@ def _determined(
     return "yes, if the law is in the library"
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class LearnerResult(HasEquation, TermTables):
     """Learned law and how it was learned.
 
-    Attributes
-    ----------
-    learner
-        Name of the learner.
-    law
-        Dimensionless, ready to simulate.
-    terms
-        The law, or its projection on a library.
-    train_seconds
-        Wall-clock time of `fit`.
-    details
-        What else this learner can say; JSON-able.
-    message
-        How the fit ended.
-    members
-        Laws that fit the data about as well, this one among them; empty where there is one only.
+    `members`: laws that fit the data about as well, this one among them; empty where there is one
+    only.
     """
 
-    learner: str
-    law: AbstractConstitutiveLaw
-    terms: tuple[RecoveredTerm, ...]
-    train_seconds: float = 0.0
-    details: Mapping[str, Any] = field(default_factory=dict)
-    message: str = ""
+    learner: str  # name of the learner
+    law: AbstractConstitutiveLaw  # dimensionless, ready to simulate
+    terms: tuple[RecoveredTerm, ...]  # the law, or its projection on a library
+    train_seconds: float = 0.0  # wall-clock time of `fit`
+    details: Mapping[str, Any] = field(default_factory=dict)  # what else it can say; JSON-able
+    message: str = ""  # how the fit ended
     members: tuple[AbstractConstitutiveLaw, ...] = ()
 
     def __repr__(self) -> str:

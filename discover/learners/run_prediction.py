@@ -16,15 +16,11 @@ from discover.dataset.records.thinning import without_spikes
 from discover.dataset.run import Run
 from discover.forward import make_batch
 from discover.forward.of_fluids import followed, observed, pieces_in_time
-from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
+from discover.learners.files import Provenance, provenance_of, write_estimator
 from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
-from discover.learners.settings import (
-    check_settings,
-    known_part,
-    require_known_rate,
-)
+from discover.learners.settings import check_settings, known_part, require_known_rate
 from discover.linear_algebra_threads import in_one_thread
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
@@ -61,9 +57,6 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     """Attributes of the fit that a file holds."""
 
     _index = ("term",)
-
-    _saved_types: ClassVar[tuple[type, ...]]
-    """Dataclasses among them and among the parameters."""
 
     @in_one_thread
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
@@ -178,20 +171,14 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
             self.learner,
             {name: value for name, value in parameters.items() if name != "progress"},
             {name: getattr(self, name) for name in (*self._saved, "lack_of_fit_")},
-            (*self._saved_types, LackOfFit),
         )
 
-    @classmethod
-    def _from_file(cls, file: EstimatorFile) -> Any:
-        parameters, fitted = file.read((*cls._saved_types, LackOfFit))
-        try:
-            estimator = cls(**parameters)
-            for name in cls._saved:
-                setattr(estimator, name, fitted[name])
-            estimator._left = fitted.get("lack_of_fit_")
-        except (KeyError, TypeError) as error:
-            raise file.damaged(error) from None
-        return estimator
+    def _with_fit(self: _Learner, fitted: Mapping[str, Any]) -> _Learner:
+        """Return the estimator with attributes of a fit that a file held."""
+        for name in self._saved:
+            setattr(self, name, fitted[name])
+        self._left = fitted.get("lack_of_fit_")
+        return self
 
     def predict(self, X: Iterable[Run]) -> Float[np.ndarray, " rows"]:
         """Return what is recorded at the samples of all runs, one run after the other.

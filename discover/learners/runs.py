@@ -71,9 +71,6 @@ def require_signal(runs: Sequence[Run]) -> None:
             )
 
 
-AFFORDABLE = 6000.0
-"""Modes times steps of all runs up to which every trial is made on the fine grid."""
-
 WORTH_IT = 0.5
 """Share of the steps that a rough grid may have at most: it has programs of its own to compile."""
 
@@ -129,7 +126,7 @@ def shorter_where_it_pays(
     problem: _Problem,
     make: Callable[[Sequence[Run]], _Problem],
     relaxation_time: Float[np.ndarray, " k"],
-    affordable: float = AFFORDABLE,
+    affordable: float,
 ) -> tuple[Sequence[Run], _Problem]:
     """Return runs with shorter holds and their problem where that saves half the steps or more.
 

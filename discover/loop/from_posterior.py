@@ -15,7 +15,7 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
-from discover.identify.oil_twin import oil_twin
+from discover.identify.twins import oil_twin
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.noise import STATED_TOO_SMALL

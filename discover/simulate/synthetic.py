@@ -30,15 +30,11 @@ from discover.statistics.noise.noise_model import rms
 
 @dataclass(frozen=True, repr=False)
 class SyntheticDataset(Dataset):
-    """A data set whose law is known.
-
-    `exact`: noise-free stresses of each run, normal stresses included.
-    `noise`: standard deviation of the noise over the root-mean-square stress of each run.
-    """
+    """A data set whose law is known."""
 
     truth: Fluid | None = None  # the fluid that made it
-    exact: Mapping[str, ShearStress] | None = None
-    noise: float = 0.0
+    exact: Mapping[str, ShearStress] | None = None  # of each run without noise, by its name
+    noise: float = 0.0  # standard deviation over the root-mean-square stress of each run
 
 
 def synthetic_dataset(

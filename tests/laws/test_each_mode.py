@@ -17,7 +17,8 @@ from discover.forward.of_fluids import observed_in
 from discover.identify.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.each_mode import law_of_each_mode, with_modes
-from discover.learners.files import plain, restored
+from discover.learners.files import plain
+from discover.learners.load import restored
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import trajectories
@@ -120,7 +121,7 @@ def test_a_law_of_each_mode_is_written_with_its_name_and_goes_through_a_file():
         law_parts(law_of_each_mode(unnamed))
 
     # as it is from a file
-    again = restored(plain(giesekus(), (), "law"), ())
+    again = restored(plain(giesekus(), "law"))
     assert np.asarray(again.law.mobility) == pytest.approx(MOBILITIES)
 
 

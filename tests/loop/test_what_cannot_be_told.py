@@ -11,7 +11,7 @@ from scipy.integrate import odeint
 
 import discover as dc
 from discover.dataset.records.repeats import count_flows
-from discover.identify.oil_twin import oil_twin
+from discover.identify.twins import oil_twin
 from discover.loop import DeclaredModel, run_loop
 from discover.protocols import oscillatory_shear, start_up
 from discover.protocols.control import steady_rates

@@ -24,19 +24,15 @@ class CodeNotation(Notation):
     saturating_form = "({trace} / (1 + {level} * abs({trace})))"
 
     def trace(self, tensor: str) -> str:
-        """Return a call of the method of matrices."""
         return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
 
     def digits_of(self, value: float) -> str:
-        """Return all digits."""
         return repr(float(value))
 
     def letter(self, name: str) -> str:
-        """Refuse: every term of an equation has its numbers."""
         raise ValueError(f"Code needs a number for {name}.")
 
     def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
-        """Return the expression as SymPy prints it."""
         text, _ = printed(expression, letters, self._text)
         return f"({text})" if factor else text
 
@@ -255,18 +251,12 @@ S|time_factor = sympy.sympify({on_time})
 
 
 def numpy_code(equation: Equation) -> str:
-    """Return a module with the law as a function of numpy arrays.
-
-    Raises InputError if the equation has a named law without written form.
-    """
+    """Return a module of numpy functions; InputError if a named law has no written form."""
     return filled(_NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))")
 
 
 def sympy_code(equation: Equation) -> str:
-    """Return a module with the law as SymPy expressions in components.
-
-    Raises InputError as for `numpy_code`.
-    """
+    """Return a module of SymPy expressions in components; InputError as for `numpy_code`."""
     named = equation.named
     constants = ""
     if named is not None and named.function.constants:
@@ -301,8 +291,8 @@ def filled(
         variables = tuple(function.rates)
         letters = {name: f'constant["{name}"]' for name in function.constants}
         letters |= {name: name for name in (*function.where, *variables)}
-        defined, summands = function.spell(notation, letters)
-        rates = ", ".join(text for _, text in function.spell_rates(notation, letters))
+        defined, changes, summands = function.spell(notation, letters)
+        rates = ", ".join(text for _, text in changes)
         where = "".join(f"{indent}{name} = {value}\n" for name, value in defined)
         lines = summands + lines
         constants = _constants(equation) if constants is None else constants

@@ -124,7 +124,7 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
             )
         notes = () if factor == 1.0 else (f"The factor {factor:.6g} was taken as 1.",)
         model = _ptt("exponential", inner["epsilon"] * drive, found, drive, relax)
-        return RheoToolModel(model.type, model.options, model.parameters, drive, relax, notes)
+        return replace(model, notes=notes)
     pattern = _finitely_extensible(found, tolerance)
     if pattern is not None:
         limit, exact = pattern

@@ -117,8 +117,5 @@ class _UflNotation(CodeNotation):
 
 
 def ufl_code(equation: Equation) -> str:
-    """Return a module with the law as UFL expressions.
-
-    Raises InputError if the equation has a named law of which nobody said how it is written.
-    """
+    """Return a module of UFL expressions; InputError if a named law has no written form."""
     return filled(_TEMPLATE, equation, _UflNotation(), "ufl.as_tensor([[0.0] * 3] * 3)")

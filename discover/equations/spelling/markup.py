@@ -7,11 +7,7 @@ from xml.etree.ElementTree import tostring
 
 from discover.equations.parts import NamedPart
 from tensor_library import LawTerm, parse_term
-from tensor_library.notation import (
-    LatexNotation,
-    Notation,
-    greek_letter,
-)
+from tensor_library.notation import LatexNotation, Notation, greek_letter
 
 if TYPE_CHECKING:
     import sympy
@@ -54,9 +50,8 @@ def _law(
     if named is not None:
         function, fixed = named.function, named.constants[0]
         spelled = latex_letters(named, notation)
-        where, summands = function.spell(notation, spelled)
+        where, rates, summands = function.spell(notation, spelled)
         pieces += [f"+ {summand}" for summand in summands]
-        rates = function.spell_rates(notation, spelled)
         defined += [(rf"\dot{{{spelled[name]}}}", value) for name, value in rates]
         defined += [(spelled[name], value) for name, value in where]
         constant = {n: value for n, value in fixed.items() if n not in named.differing}
@@ -195,7 +190,7 @@ def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> 
         letters |= {name: sympy.Symbol(name) for name in named.differing}
         function = named.function
         letters |= {name: sympy.Symbol(name) for name in (*function.where, *function.rates)}
-        where, summands = function.spell(notation, letters)
+        where, _, summands = function.spell(notation, letters)
         total = sympy.Add(*summands)
         for name, value in reversed(where):
             total = total.subs(letters[name], value)

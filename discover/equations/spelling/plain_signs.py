@@ -2,17 +2,12 @@
 
 import re
 
-_LETTERS = dict(
-    alpha="α", beta="β", gamma="γ", delta="δ", epsilon="ε", varepsilon="ε", zeta="ζ", eta="η",
-    theta="θ", Theta="Θ", kappa="κ", lambda_="λ", mu="μ", nu="ν", xi="ξ", pi="π", rho="ρ",
-    sigma="σ", tau="τ", phi="φ", chi="χ", psi="ψ", omega="ω", Omega="Ω", Delta="Δ", Lambda="Λ",
-    Gamma="Γ", Sigma="Σ",
-)  # fmt: skip
+from tensor_library.notation import greek_letter
+
 _SIGNS = dict(
     cdot=" · ", times=" × ", to=" → ", sum="Σ ", int="∫ ", partial="∂", infty="∞", nabla="∇",
     le=" ≤ ", leq=" ≤ ", ge=" ≥ ", geq=" ≥ ", approx=" ≈ ", pm=" ± ", quad=" ", left="", right="",
 )  # fmt: skip
-_SAID = {name.rstrip("_"): sign for name, sign in (_LETTERS | _SIGNS).items()}
 _FONTS = {"mathrm", "mathbf", "mathrel", "text", "operatorname", "boldsymbol", "bm"}
 _ACCENTS = {"dot": "\u0307", "ddot": "\u0308", "hat": "\u0302", "bar": "\u0304", "tilde": "\u0303"}
 
@@ -54,7 +49,8 @@ def _next(tokens: list[str]) -> str:
     if name == "overset":
         over, under = _argument(tokens), _argument(tokens)
         return f"{under}^{over}"
-    return _SAID.get(name, name if name.isalpha() else " ")
+    letter = greek_letter(name.removeprefix("var"))
+    return letter or _SIGNS.get(name, name if name.isalpha() else " ")
 
 
 def _argument(tokens: list[str]) -> str:

@@ -15,19 +15,13 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
 from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
-from discover.learners.tbnn_ude.problem import (
-    DefaultRecipe,
-    Trained,
-    TrainingProblem,
-    make_problem,
-)
+from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
@@ -97,7 +91,6 @@ class TBNNUDE(RunPrediction):
 
     learner = "tbnn_ude"
     _saved = (*RunPrediction._saved, "members_", "ensemble_fluids_", "ensemble_", "fitting_")
-    _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
     recipe: str | DefaultRecipe | PaperRecipe = "default"
     n_members: int = 3

@@ -14,6 +14,7 @@ from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import observed_on_grid
 from discover.forward.of_fluids import pieces_in_time
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
+from discover.learners.files import kept_in_files
 from discover.programs import on_device
 from discover.statistics.noise.noise_model import rms
 
@@ -60,17 +61,13 @@ class Records(eqx.Module):
 
 
 class TrainingProblem(eqx.Module):
-    """Records of several runs, and the modes that the network serves.
-
-    `stress`: rms stress of each run in Pa, with which the prior compares its states, shape (runs,).
-    `modulus`, `relaxation_time`: of each mode in Pa and s, shape (k,).
-    """
+    """Records of several runs, and the modes that the network serves."""
 
     flows: FlowBatch  # the runs, on fixed time grids
     records: Records
-    stress: Float[Array, " runs"]
-    modulus: Float[Array, " k"]
-    relaxation_time: Float[Array, " k"]
+    stress: Float[Array, " runs"]  # rms in Pa, with which the prior compares states
+    modulus: Float[Array, " k"]  # in Pa
+    relaxation_time: Float[Array, " k"]  # in s
     solvent_viscosity: Float[Array, ""]  # in Pa s
 
     def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
@@ -131,45 +128,38 @@ def make_problem(
     )
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class DefaultRecipe:
     """Settings of the default recipe, independent of the law that made the data.
 
-    `width`: neurons in each of two hidden layers, half where coefficients vary little.
-    `affordable`: work (modes × runs × steps) up to which functions on single tensors are tried.
     `strengths`, `variations`: of the penalties in successive rounds, relative to the squared
-    stress; of the latter the first that leaves noise alone ends. `removed_below`: a smaller term,
-    by rms over the largest, is removed. `resolved`: relative misfit below what rheometers resolve.
-    `exact`: that of integration.
+    stress; of the latter the first that leaves noise alone ends.
     """
 
-    width: int = 12
-    affordable: float = 6000.0
+    width: int = 12  # neurons in each of two hidden layers, half where coefficients vary little
+    affordable: float = 6000.0  # modes × runs × steps up to which single tensors are tried
     samples: int = 100  # most samples of a run that are fitted where the work is more than that
     strengths: tuple[float, ...] = (1e-3, 1e-4)
     variations: tuple[float, ...] = (1.0, 0.1, 1e-2, 1e-3)
     steps: int = 10  # levenberg–Marquardt steps a round, and for each tensor tried
     polish_steps: int = 40  # steps after the penalty is gone
     max_tensors: int = 3  # most tensors with coefficients that vary
-    removed_below: float = 2e-3
-    resolved: float = 5e-4
-    exact: float = 1e-5
+    removed_below: float = 2e-3  # rms over the largest term's below which a term is removed
+    resolved: float = 5e-4  # relative misfit below what rheometers resolve
+    exact: float = 1e-5  # that of integration
 
 
 @dataclass(frozen=True)
 class Trained:
-    """Trained law.
-
-    `tensors`: those whose coefficients vary, in the order taken. `passed_over`: the others from
-    which a law could have started, the least misfit first.
-    """
+    """Trained law."""
 
     law: TensorBasisNetwork  # after the polish without prior
     penalised_law: TensorBasisNetwork  # as the prior left it
     misfit: float  # relative misfit to the data at the end
     varies: bool  # whether the network part was needed
     message: str  # how the training ended
-    tensors: tuple[int, ...] = ()
-    passed_over: tuple[int, ...] = ()
+    tensors: tuple[int, ...] = ()  # those whose coefficients vary, in the order taken
+    passed_over: tuple[int, ...] = ()  # others a law could have started from, least misfit first
     others: "tuple[Trained, ...]" = ()  # less likely laws that were met on the way
     left_out: str = ""  # what was not tried, to save time, in words

@@ -23,8 +23,8 @@ SIMILAR = 1.05
 class Projection:
     """A sparse expansion of a network's extra term.
 
-    `misfit`: norm of what is left over that of the extra term, all four components, over the states
-        that training visited, each with the weight that the record gives its mode.
+    `misfit`: norm of what is left over that of the extra term, over the states that training
+    visited, each with the weight that the record gives its mode.
     """
 
     terms: tuple[LawTerm, ...]  # with least-squares coefficients; none of a law that adds nothing
@@ -80,7 +80,7 @@ def project(
         if support and best > 0.9 * misfit:  # not worth a term beside the others
             break
         near = [j for j, value in trials.items() if value <= SIMILAR * best + 1e-9]
-        support.append(min(near, key=lambda j: (library.complexities[j], j)))
+        support.append(min(near, key=lambda j: (library.terms[j].complexity, j)))
         misfit = trials[support[-1]]
     while len(support) > 1:  # a first pick may have become redundant
         without = {

@@ -1,6 +1,6 @@
 """Recipes of training: the default, and that of the paper."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import equinox as eqx
@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
+from discover.learners.files import kept_in_files
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
 from discover.learners.tbnn_ude.session import (
@@ -37,7 +38,7 @@ def train_default(
     problem: TrainingProblem,
     key: PRNGKeyArray,
     linear_relaxation: bool,
-    recipe: DefaultRecipe | None,
+    recipe: DefaultRecipe,
     progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
     goes_on: Callable[[TensorBasisNetwork, float], bool] = lambda law, misfit: True,
@@ -49,7 +50,6 @@ def train_default(
     network. `goes_on`: whether functions are worth their time beside a law of constants and its
     misfit.
     """
-    recipe = recipe or DefaultRecipe()
     session = Session(problem, recipe, progress)
     # beside a network that is zero the steps would be the same, at three times the work
     start = without_network(linear_relaxation, base_law)
@@ -135,8 +135,6 @@ def _finish(
     )  # fmt: skip
 
 
-PaperProgress = Callable[[int, int, float], None]
-
 _CHUNK = 50
 """Iterations between two looks at the clock; each chunk is one compiled scan."""
 
@@ -145,6 +143,7 @@ _INITIAL_OUTPUT = 0.01
 trajectories diverge; the paper does not say how its network started."""
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class PaperRecipe:
     """Settings of the paper."""
@@ -216,8 +215,8 @@ def train_paper(
     problem: TrainingProblem,
     key: PRNGKeyArray,
     linear_relaxation: bool,
-    recipe: PaperRecipe | None,
-    progress: PaperProgress | None = None,
+    recipe: PaperRecipe,
+    progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
 ) -> tuple[TensorBasisNetwork, Float[np.ndarray, " m"]]:
     """Return a law trained by the paper's recipe, and the loss at every iteration.
@@ -226,7 +225,6 @@ def train_paper(
     weights. `linear_relaxation`: whether −σ is known. `progress`: called every 50 iterations with
     iteration, total and loss. `base_law`: known law to which the network is added.
     """
-    recipe = recipe or PaperRecipe()
     law = initial_law(key, recipe.width, linear_relaxation, None, base_law, _INITIAL_OUTPUT)
     network = law.network
     state = _adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))

@@ -12,16 +12,12 @@ from discover.inference.engine.fits import Fitter
 from discover.inference.engine.left_out import left_out
 from discover.laws import Fluid
 from discover.laws.expansion import law_of_terms
-from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files import Provenance
+from discover.learners import LearnerResult
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import check_library, default_library, law_below
 from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
-from discover.learners.tensor_sindy.search import (
-    SupportSearch,
-    library_problem,
-)
+from discover.learners.tensor_sindy.search import SupportSearch, library_problem
 from discover.progress import Progress, by_lines
 from tensor_library import LawTerms, TermLibrary
 
@@ -96,7 +92,6 @@ class TensorSINDy(RunPrediction):
 
     learner = "tensor_sindy"
     _saved = (*RunPrediction._saved, "library_", "coefficients_", "inner_", "covariance_")
-    _saved_types = (LearnerResult, RecoveredTerm, Provenance)
 
     library: TermLibrary | None = None
     optimizer: str | BaseOptimizer = "stlsq"

@@ -1,12 +1,10 @@
 """pysindy's sparse optimisers on a bare design matrix, swept from dense to empty."""
 
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
-import pysindy
 from jaxtyping import Float
-from pysindy.optimizers import FROLS, SR3, SSR, STLSQ
+from pysindy.optimizers import FROLS, SR3, SSR, STLSQ, BaseOptimizer
 from sklearn import config_context
 from sklearn.base import clone
 
@@ -20,12 +18,8 @@ _STRENGTHS = np.geomspace(1e-3, 1.0, 13)
 _RIDGE = 1e-8  # columns have unit norm: enough to make collinear ones solvable, no more
 
 
-@dataclass(frozen=True)
-class SparseSolution:
-    """Solution of a sparse linear problem; coefficients thresholded or penalised, not refitted."""
-
-    support: tuple[int, ...]  # positions of the non-zero coefficients, increasing
-    coefficients: Float[np.ndarray, " n"]
+Support = tuple[int, ...]
+"""Positions of the non-zero coefficients, increasing."""
 
 
 def check_optimiser(optimizer) -> None:
@@ -35,7 +29,7 @@ def check_optimiser(optimizer) -> None:
             raise InputError(
                 f"{unknown_name('optimizer', optimizer, OPTIMISERS)} Or pass a pysindy optimizer."
             )
-    elif not isinstance(optimizer, pysindy.optimizers.BaseOptimizer):
+    elif not isinstance(optimizer, BaseOptimizer):
         raise InputError(
             f"optimizer must be one of {', '.join(OPTIMISERS)} or a pysindy optimizer; got a "
             f"{type(optimizer).__name__}."
@@ -47,62 +41,53 @@ def solve_sparse(
     design: Float[np.ndarray, "rows n"],
     target: Float[np.ndarray, " rows"],
     max_terms: int,
-) -> list[SparseSolution]:
-    """Return the solutions of an optimiser from its mildest to its strictest setting.
+) -> dict[Support, Float[np.ndarray, " n"]]:
+    """Return coefficients by support, from an optimiser's mildest to its strictest setting.
 
-    Columns and target are brought to unit norm, so that a threshold is the share of the signal that
-    a term must carry. `optimizer`: a name of `OPTIMISERS`, or a pysindy optimiser as it is set.
-    `max_terms`: largest support of interest to a forward method. Supports differ and are not empty.
+    Thresholded or penalised, not refitted. Columns and target are brought to unit norm, so that a
+    threshold is the share of the signal that a term must carry. `optimizer`: a name of
+    `OPTIMISERS`, or a pysindy optimiser as it is set. `max_terms`: largest support of interest to a
+    forward method.
     """
-    check_optimiser(optimizer)
+    name = optimizer.lower() if isinstance(optimizer, str) else ""
     norms = np.linalg.norm(design, axis=0)
     usable = np.flatnonzero(norms > 1e-12 * max(np.max(norms, initial=0.0), 1e-300))
     size = float(np.linalg.norm(target))
     if usable.size == 0 or size == 0.0:
-        return []
+        return {}
     matrix, right = design[:, usable] / norms[usable], target / size
-    solutions: dict[tuple[int, ...], SparseSolution] = {}
-    for normalised in _sweep(optimizer, matrix, right, max_terms):
-        coefficients = np.zeros(design.shape[1])
-        coefficients[usable] = normalised * size / norms[usable]
-        support = tuple(int(i) for i in np.flatnonzero(coefficients))
-        if support and np.all(np.isfinite(coefficients)):
-            solutions.setdefault(support, SparseSolution(support, coefficients))
-    return list(solutions.values())
+    if name == "frols":
+        # it orthogonalises, and stops with an error where columns depend on one another, as those
+        # of twins do: the ridge as further rows makes them independent
+        matrix = np.vstack([matrix, np.sqrt(_RIDGE) * np.eye(usable.size)])
+        right = np.concatenate([right, np.zeros(usable.size)])
+    solutions: dict[Support, np.ndarray] = {}
+    # a clone: pysindy's optimisers may change their own settings while they fit
+    each = _of_name(name, usable.size, max_terms) if name else [clone(optimizer)]
+    for one in each:
+        for normalised in _fitted(one, matrix, right, history=name in ("ssr", "frols")):
+            coefficients = np.zeros(design.shape[1])
+            coefficients[usable] = normalised * size / norms[usable]
+            support = tuple(np.flatnonzero(coefficients).tolist())
+            if support and np.all(np.isfinite(coefficients)):
+                solutions.setdefault(support, coefficients)
+    return solutions
 
 
-def _sweep(optimizer, matrix, right, max_terms):
-    """Yield normalised coefficients."""
-    n = matrix.shape[1]
-    if not isinstance(optimizer, str):
-        # a clone: pysindy's optimisers may change their own settings while they fit
-        yield from _fitted(clone(optimizer), matrix, right, history=False)
-        return
-    name = optimizer.lower()
+def _of_name(name: str, n: int, max_terms: int) -> list[BaseOptimizer]:
+    """Return an optimiser for `n` columns at each of its settings."""
     if name == "stlsq":
-        for strength in _STRENGTHS:
-            yield from _fitted(
-                STLSQ(threshold=strength, alpha=_RIDGE, unbias=False), matrix, right, False
-            )
-    elif name == "sr3":
-        for strength in _STRENGTHS:
-            # L0 with relaxation ν thresholds at √(2 λ ν)
-            optimiser = SR3(
-                reg_weight_lam=0.5 * strength**2, relax_coeff_nu=1.0, max_iter=200, unbias=False
-            )
-            yield from _fitted(optimiser, matrix, right, False)
-    elif name == "ssr":
-        yield from _fitted(SSR(alpha=_RIDGE, max_iter=n, unbias=False), matrix, right, True)
-    else:
-        steps = min(max_terms + 1, n)
-        # FROLS orthogonalises, and stops with an error where columns depend on one another, as
-        # those of twins do: the ridge as further rows makes them independent
-        matrix = np.vstack([matrix, np.sqrt(_RIDGE) * np.eye(n)])
-        right = np.concatenate([right, np.zeros(n)])
-        yield from _fitted(FROLS(alpha=_RIDGE, max_iter=steps, unbias=False), matrix, right, True)
+        return [STLSQ(threshold=one, alpha=_RIDGE, unbias=False) for one in _STRENGTHS]
+    if name == "sr3":
+        # L0 with relaxation ν thresholds at √(2 λ ν)
+        settings = {"relax_coeff_nu": 1.0, "max_iter": 200, "unbias": False}
+        return [SR3(reg_weight_lam=0.5 * one**2, **settings) for one in _STRENGTHS]
+    if name == "ssr":
+        return [SSR(alpha=_RIDGE, max_iter=n, unbias=False)]
+    return [FROLS(alpha=_RIDGE, max_iter=min(max_terms + 1, n), unbias=False)]
 
 
-def _fitted(optimiser, matrix, right, history):
+def _fitted(optimiser, matrix, right, history: bool) -> list[np.ndarray]:
     # what is checked here was made here; checking thousands of small fits took a third of the time
     unchecked = config_context(assume_finite=True, skip_parameter_validation=True)
     with unchecked, warnings.catch_warnings():
@@ -111,9 +96,6 @@ def _fitted(optimiser, matrix, right, history):
         try:
             optimiser.fit(matrix, right)
         except (ValueError, np.linalg.LinAlgError):
-            return  # collinear columns at this setting; other settings and moves remain
-    if history:
-        for coefficients in optimiser.history_:
-            yield np.asarray(coefficients, dtype=float).reshape(-1)
-    else:
-        yield np.asarray(optimiser.coef_, dtype=float).reshape(-1)
+            return []  # collinear columns at this setting; other settings and moves remain
+    found = optimiser.history_ if history else [optimiser.coef_]
+    return [np.asarray(one, dtype=float).reshape(-1) for one in found]

@@ -24,49 +24,40 @@ def recovered_terms(search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...
     """Return the terms of a fit in the order of the library; none of an empty law."""
     if not fit.names or fit.covariance is None:
         return ()
-    model, library, support = search.problem.model, search.library, search.support(fit)
-    penalised = _penalised(search, fit)
-    middle = fit.coordinates
-
-    def ends(value: float, variance: float, place: int) -> tuple[float, float]:
-        prior = list(fit.priors.values())[place]
-        half = HALF_BAND * float(np.sqrt(max(variance, 0.0)))
-        low, high = (prior.to_value(np.clip(value + s * half, *prior.ends)) for s in (-1.0, 1.0))
-        return low, high
-
+    model, penalised = search.problem.model, _penalised(search, fit)
     terms = []
-    for index in support:
-        term = library.terms[index]
+    for index in search.support(fit):
+        term = search.library.terms[index]
         at, *inner_at = model.positions(term.name)
-        place = fit.free.index(at)
-        value, variance = float(middle[place]), float(fit.covariance[place, place])
-        inner, inner_ci95, at_one = {}, {}, {}
-        for position in inner_at:
-            assert term.form is not None
-            name, own = term.form.inner_name, fit.free.index(position)
-            of_own = float(fit.covariance[own, own])
-            inner[name] = float(fit.theta[position])
-            inner_ci95[name] = ends(float(middle[own]), of_own, own)
-            if abs(value - 1.0) <= HALF_BAND * np.sqrt(variance):
-                # the normal distribution of the one, given that the other is one
-                slope = float(fit.covariance[own, place]) / variance
-                known = float(middle[own]) + slope * (1.0 - value)
-                left = of_own - slope * float(fit.covariance[own, place])
-                prior = list(fit.priors.values())[own]
-                at_one[name] = (prior.to_value(known), *ends(known, left, own))
+        inner = dict(zip(term.inner_names, inner_at, strict=True))
+        low, high = fit.interval(at)
+        may_be_one = low <= 1.0 <= high
         terms.append(
             RecoveredTerm(
                 term=term.name,
-                coefficient=value,
+                coefficient=float(fit.theta[at]),
                 coefficient_penalised=penalised.get(index),
-                ci95=ends(value, variance, place),
-                inner=inner,
-                inner_ci95=inner_ci95,
-                inner_at_one=at_one,
+                ci95=(low, high),
+                inner={name: float(fit.theta[own]) for name, own in inner.items()},
+                inner_ci95={name: fit.interval(own) for name, own in inner.items()},
+                inner_at_one={n: _at_one(fit, at, own) for n, own in inner.items() if may_be_one},
                 latex=term.latex(),
             )
         )
     return tuple(terms)
+
+
+def _at_one(fit: Fit, coefficient: int, position: int) -> tuple[float, float, float]:
+    """Return a constant and its 95 % interval, given that a coefficient is one."""
+    prior, covariance = fit.priors[position], fit.covariance
+    assert covariance is not None
+    own, place = fit.free.index(position), fit.free.index(coefficient)
+    # the normal distribution of the one, given the other
+    slope = covariance[own, place] / covariance[place, place]
+    middle = fit.coordinates[own] + slope * (1.0 - fit.theta[coefficient])
+    half = HALF_BAND * np.sqrt(max(covariance[own, own] - slope * covariance[own, place], 0.0))
+    low, high = (prior.to_value(np.clip(middle + s * half, *prior.ends)) for s in (-1.0, 1.0))
+    return prior.to_value(middle), low, high
 
 
 def covariance_of_terms(search: SupportSearch, fit: Fit) -> Float[np.ndarray, "p p"] | None:
@@ -84,16 +75,15 @@ def covariance_of_terms(search: SupportSearch, fit: Fit) -> Float[np.ndarray, "p
 def _penalised(search: SupportSearch, fit: Fit) -> dict[int, float]:
     """Return what the optimiser makes of the terms of a fit: thresholded or penalised."""
     model, support = search.model_at(fit), search.support(fit)
-    for solution in solve_sparse(search.optimizer, model.design, model.target, search.most):
-        if solution.support == support:
-            return {i: float(solution.coefficients[i]) for i in support}
+    swept = solve_sparse(search.optimizer, model.design, model.target, search.most)
+    if support in swept:
+        return {i: float(swept[support][i]) for i in support}
     # the optimiser left to itself stops elsewhere: what it says of these terms alone
     design = model.design[:, list(support)]
     alone = solve_sparse(search.optimizer, design, model.target, len(support))
     if not alone:
         return dict.fromkeys(support, 0.0)
-    densest = max(alone, key=lambda s: len(s.support)).coefficients
-    return dict(zip(support, map(float, densest), strict=True))
+    return dict(zip(support, map(float, alone[max(alone, key=len)]), strict=True))
 
 
 def _described(search: SupportSearch, fit: Fit) -> dict[str, Any]:

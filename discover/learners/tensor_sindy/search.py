@@ -50,12 +50,9 @@ def library_problem(
 
 @dataclass(frozen=True)
 class LinearModel:
-    """y − σ(c₀) + S c₀ ≈ S c: the records near a trial law, linear in the coefficients.
+    """y − σ(c₀) + S c₀ ≈ S c: the records near a trial law, linear in the coefficients."""
 
-    `design`: S by terms over the noise, orthogonal to the nuisances, compressed to as many rows as
-    unknowns. `target`: the left-hand side, likewise.
-    """
-
+    # S over the noise, orthogonal to the nuisances, compressed to as many rows as unknowns
     design: Float[np.ndarray, "rows n"]
     target: Float[np.ndarray, " rows"]  # the left-hand side, likewise
 
@@ -146,10 +143,7 @@ class SupportSearch(Search):
         return self.difference(one, other) <= max(_SAME * other.noise.common, ARITHMETIC)
 
     def complexity(self, fit: Fit) -> tuple:
-        """Return the order in which indistinguishable fits are preferred.
-
-        Fewer terms, lower complexity, fewer invariants, order of the library.
-        """
+        """Return the order in which indistinguishable fits are preferred, the simplest first."""
         terms = [self.library.terms[i] for i in self.support(fit)]
         return (
             len(terms),
@@ -240,13 +234,13 @@ class SupportSearch(Search):
         if fit.jacobian is None:
             return []
         model, found = self.model_at(fit), []
-        for solution in solve_sparse(self.optimizer, model.design, model.target, self.most):
-            names = tuple(self.library.names[i] for i in solution.support)
+        for support in solve_sparse(self.optimizer, model.design, model.target, self.most):
+            names = tuple(self.library.names[i] for i in support)
             if len(names) > self.most or not self._is_a_law(names):
                 continue
             gone = [name for name in fit.names if name not in names]
             theta = self.problem.without(fit.theta, *gone)
-            for name, value in zip(names, model.solved(solution.support), strict=True):
+            for name, value in zip(names, model.solved(support), strict=True):
                 theta[self.problem.model.positions(name)[0]] = value
             found.append(self.fitter.start(names, theta, fit.linear))
         return [*found, *self.scored(fit)[: _MORE if fit.names else _FIRST]]
