@@ -1,6 +1,6 @@
 """Recipes of training: the default, and that of the paper."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import equinox as eqx
