@@ -107,12 +107,7 @@ _WHAT = {
     "response": "a transducer that answers late, by a function of the lag alone",
     "rate": "a function of the shear rate alone",
     "network": "a factor that depends on the strain alone",
-    "position": "a function of the tool's position alone",
-    "gap": "a factor that depends on the tool's position alone",
-    "phase": "a function of the phase of the cycle alone",
-    "relaxation": "a rate of relaxation that depends on the {variable} alone",
-    "breakdown": "a structure that flow breaks at a rate that depends on the {variable} alone",
-    "slip": "a rate of slip that depends on the {variable} alone",
+    "slip": "a rate of slip that depends on the stress alone",
 }
 
 
@@ -133,9 +128,8 @@ def free_form_sentence(found: FreeForm) -> str:
     told = words.effect_title if found.in_answer else _with_constants(found)  # the answer has them
     effects = " and ".join(map(told, found.beside)) or "your model"
     shape = f"close to the {found.nearest} form" if found.nearest else "close to no known form"
-    what = _WHAT[found.slot].format(variable=found.variable)
     left = "leaves noise" if found.in_answer else "explains the residual"
-    return f"{effects} with {what} ({shape}) {left}; that function has no name here"
+    return f"{effects} with {_WHAT[found.slot]} ({shape}) {left}; that function has no name here"
 
 
 _TOGETHER = re.compile(

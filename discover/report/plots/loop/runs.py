@@ -233,11 +233,6 @@ _AXES = {
     "rate": ("shear rate (1/s)", "recorded less true stress (Pa)"),
     "response": ("lag (s)", "response of the transducer (1/s)"),
     "network": ("strain", "relative change of the stress"),
-    "position": ("strain, as the tool stands", "recorded less true stress (Pa)"),
-    "gap": ("strain, as the tool stands", "relative change of the stress"),
-    "phase": ("phase of the cycle, from the largest rate (rad)", "recorded less true stress (Pa)"),
-    "relaxation": ("{variable}, dimensionless", "relative change of the rate of relaxation"),
-    "breakdown": ("shear rate (1/s)", "rate at which structure breaks (1/s)"),
     "slip": ("stress (Pa)", "rate taken by slip (1/s)"),
 }
 
@@ -250,7 +245,7 @@ def free_form_picture(result: LoopResult) -> look.Picture | None:
         band = one.grid, one.low95, one.high95, {"color": look.SHADE, "label": "95 % band"}
         curve = one.grid, one.value, {"color": look.NETWORK, "lw": 1.5, "label": "free function"}
         zero = one.grid[[0, -1]], [0.0, 0.0], {"color": "0.6", "lw": 0.6}
-        labels = {"xlabel": along.format(variable=one.variable), "ylabel": up}
+        labels = {"xlabel": along, "ylabel": up}
         panels.append(look.Panel([curve, zero], labels, [band]))
     said = "; ".join(map(free_form_sentence, result.free_form))
     caption = f"Effect without a name: {said}. The bands assume that it depends on this alone."
