@@ -8,13 +8,14 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
+from discover.forward.of_fluids import bare_run
 from discover.inference.engine import Posterior
 from discover.inference.engine.bands import SIMPLE_FLUIDS
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import TERM_ODDS
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
-from discover.protocols import FlowProtocol, in_flow, shear_rates, start_up
+from discover.protocols import in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
 from discover.statistics.noise.noise_model import rms
 
@@ -68,13 +69,12 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
         assert fit.covariance is not None
         thetas += [*fit.drawn(lot.standard_normal((_DRAWS, len(fit.covariance))))[0]]
         weights += [weight / _DRAWS] * _DRAWS
-    inside = [_run(*one) for one in _flows_inside(runs, rates)]
-    fast = start_up(BEYOND * max(rates))
-    sheared = [*inside, _run(fast, np.linspace(0.0, _STRAIN / (BEYOND * max(rates)), _SAMPLES))]
+    inside = _flows_inside(runs, rates)
+    sheared = [*inside, _start_up(BEYOND * max(rates), _STRAIN)]
     pulled = []
     for rate in (max(rates), BEYOND * max(rates)):
         flow = in_flow(start_up(rate), "uniaxial")
-        pulled.append(_run(flow, np.linspace(0.0, _HENCKY / rate, _SAMPLES)))
+        pulled.append(bare_run(flow, np.linspace(0.0, _HENCKY / rate, _SAMPLES)))
     model, vectors = posterior.problem.model, np.array(thetas)
     with np.errstate(all="ignore"):
         in_shear = model.observables(vectors, make_batch(sheared))
@@ -136,7 +136,7 @@ def falls_above(
         if effect.kind != "constitutive":
             law[model.slices[effect.name].start] = 0.0
     curve = np.geomspace(min(rates), max(rates), _CURVE)
-    flows = [_run(start_up(rate), np.linspace(0.0, _STEADY / rate, _SAMPLES)) for rate in curve]
+    flows = [_start_up(rate, _STEADY) for rate in curve]
     with np.errstate(all="ignore"):
         stress = model.observables(law[None], make_batch(flows))[0, :, _SAMPLES - 1, 0]
     falling = np.flatnonzero(np.diff(stress) < -_ROUNDING * stress[:-1])
@@ -186,18 +186,16 @@ def misfit(posterior: Posterior, fit: Fit) -> float:
     return max(posterior.fitter_of(fit).misfit(fit), 1e-150)
 
 
-def _flows_inside(
-    runs: Sequence[Run], rates: Sequence[float]
-) -> list[tuple[FlowProtocol, Float[np.ndarray, " n"]]]:
+def _flows_inside(runs: Sequence[Run], rates: Sequence[float]) -> list[Run]:
     """Return a slow and a fast flow of the fitted runs; start-ups where these were other tests."""
     own = [run for run in runs if run.protocol.control == "rate" and run.flow == "shear"]
     own = [run for run in own if run.quantity == "sigma12" and np.any(run.rate)]
     if own:
         own.sort(key=lambda run: float(np.max(np.abs(run.rate))))
         some = [own[0], own[-1]] if len(own) > 1 else own
-        return [(run.protocol, _thinned(run.time)) for run in some]
+        return [bare_run(run.protocol, _thinned(run.time)) for run in some]
     ends = sorted({min(rates), max(rates)})
-    return [(start_up(rate), np.linspace(0.0, _STRAIN / rate, _SAMPLES)) for rate in ends]
+    return [_start_up(rate, _STRAIN) for rate in ends]
 
 
 def _thinned(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
@@ -205,7 +203,5 @@ def _thinned(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
     return times[at]
 
 
-def _run(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Run:
-    nothing = np.zeros(len(times))
-    rates = np.asarray(shear_rates(protocol, times))
-    return Run("flow", times, protocol, rates, nothing, nothing, nothing)
+def _start_up(rate: float, strain: float) -> Run:
+    return bare_run(start_up(rate), np.linspace(0.0, strain / rate, _SAMPLES))

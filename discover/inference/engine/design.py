@@ -23,10 +23,10 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward import make_batch
+from discover.forward.of_fluids import bare_run
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.posterior import Posterior
 from discover.protocols import (
-    FlowProtocol,
     after_steady_flow,
     after_step_strain,
     imposed_stress,
@@ -37,7 +37,6 @@ from discover.protocols import (
     step_rates,
 )
 from discover.protocols.kinematics import FOLLOWED, RecordedQuantity
-from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms, squared_distance
 
 BEYOND = 3.0
@@ -55,21 +54,11 @@ _AMPLITUDES, _CYCLES = (1.0, 5.0), 5.0
 _STEPS = (0.5, 3.0)
 
 
-@dataclass(frozen=True)
-class PossibleTest:
-    """A test that could be run.
-
-    `title`: in words, with numbers. `run`: it, with zeros for what would be recorded.
-    """
-
-    title: str
-    run: Run
-
-
-def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[PossibleTest]:
+def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Run]:
     """Return tests of every kind, the simplest to run first; none without a run at a given rate.
 
-    `relaxation_time`: the longest, in s.
+    Each is named in words, with numbers, and zero is recorded in it. `relaxation_time`: the
+    longest, in s.
     """
     at_rate = [run for run in runs if run.protocol.control in FOLLOWED]
     rates = [float(np.max(np.abs(run.rate))) for run in at_rate]
@@ -84,53 +73,43 @@ def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Possible
         for rate in sorted({slowest / BEYOND, slowest, fastest, BEYOND * fastest})
     ]
     found += [
-        _test(
-            f"start-up of shear at {fastest:.3g} 1/s, reversed after {0.5 * whole:.3g} s",
+        bare_run(
             step_rates([0.0, 0.5 * whole], [fastest, -fastest]),
             even,
+            f"start-up of shear at {fastest:.3g} 1/s, reversed after {0.5 * whole:.3g} s",
         ),
-        _test(
-            f"start-up of shear at {fastest:.3g} 1/s, stopped for {whole / 3:.3g} s and begun "
-            "again",
+        bare_run(
             step_rates([0.0, whole / 3, 2 * whole / 3], [fastest, 0.0, fastest]),
             even,
+            f"start-up of shear at {fastest:.3g} 1/s, stopped for {whole / 3:.3g} s and begun "
+            "again",
         ),
     ]
     after = np.geomspace(_SHORTEST * relaxation_time, _RELAXED * relaxation_time, _SAMPLES)
     stopped = after_steady_flow(start_up(0.0), fastest, end=float(after[-1]))
-    found.append(_test(f"relaxation after steady shear at {fastest:.3g} 1/s", stopped, after))
+    title = f"relaxation after steady shear at {fastest:.3g} 1/s"
+    found.append(bare_run(stopped, after, title))
     for strain in _STEPS:
         begun = after_step_strain(start_up(0.0), strain, first=float(after[0]))
-        found.append(_test(f"relaxation after a step of strain of {strain:g}", begun, after))
+        found.append(bare_run(begun, after, f"relaxation after a step of strain of {strain:g}"))
     for amplitude in _AMPLITUDES:
         frequency = fastest / amplitude
         times = np.linspace(0.0, 2.0 * np.pi * _CYCLES / frequency, _SAMPLES)
         title = f"oscillatory shear of amplitude {amplitude:g} at {frequency:.3g} rad/s, from rest"
-        found.append(_test(title, oscillatory_shear(fastest, frequency), times))
+        found.append(bare_run(oscillatory_shear(fastest, frequency), times, title))
     states = np.geomspace(slowest / BEYOND, BEYOND * fastest, _STATES)
-    found.append(
-        _test(
-            f"flow curve from {states[0]:.3g} to {states[-1]:.3g} 1/s",
-            steady_rates(states),
-            np.arange(1.0, _STATES + 1.0),
-        )
-    )
+    title = f"flow curve from {states[0]:.3g} to {states[-1]:.3g} 1/s"
+    found.append(bare_run(steady_rates(states), np.arange(1.0, _STATES + 1.0), title))
     if any(run.protocol.control == "stress" for run in runs):
         found += _creep(at_rate, relaxation_time)
-    fast = _start_up(fastest, whole).run
+    fast = _start_up(fastest, whole)
     normal = replace(fast, first_normal_stress_difference=np.zeros(len(fast)))
-    found.append(
-        PossibleTest(f"N1 in start-up of shear at {fastest:.3g} 1/s", normal.observing("N1"))
-    )
+    found.append(replace(normal.observing("N1"), name=f"N1 in {fast.name}"))
     for kind in ("uniaxial", "planar", "biaxial"):
         for rate in sorted({slowest, fastest}):
-            found.append(
-                _test(
-                    f"start-up of {kind} extension at {rate:.3g} 1/s",
-                    in_flow(start_up(rate), kind),
-                    np.linspace(0.0, _HENCKY / rate, _SAMPLES),
-                )
-            )
+            times = np.linspace(0.0, _HENCKY / rate, _SAMPLES)
+            title = f"start-up of {kind} extension at {rate:.3g} 1/s"
+            found.append(bare_run(in_flow(start_up(rate), kind), times, title))
     return found
 
 
@@ -139,19 +118,12 @@ def _duration(rate: float, relaxation_time: float) -> float:
     return min(wanted, _LONGEST_STRAIN / rate)
 
 
-def _start_up(rate: float, duration: float) -> PossibleTest:
+def _start_up(rate: float, duration: float) -> Run:
     times = np.geomspace(_SHORTEST * duration, duration, _SAMPLES)
-    return _test(f"start-up of shear at {rate:.3g} 1/s", start_up(rate), times)
+    return bare_run(start_up(rate), times, f"start-up of shear at {rate:.3g} 1/s")
 
 
-def _test(title: str, protocol: FlowProtocol, times: np.ndarray) -> PossibleTest:
-    run = Run(
-        title, times, protocol, np.asarray(shear_rates(protocol, times)), np.zeros(len(times))
-    )
-    return PossibleTest(title, run)
-
-
-def _creep(runs: Sequence[Run], relaxation_time: float) -> list[PossibleTest]:
+def _creep(runs: Sequence[Run], relaxation_time: float) -> list[Run]:
     """Return creep at the stress that the runs reach; none where they reach none."""
     stresses = [float(np.max(np.abs(run.stress))) for run in runs if run.flow == "shear"]
     rates = [float(np.max(np.abs(run.rate))) for run in runs if run.flow == "shear"]
@@ -163,10 +135,8 @@ def _creep(runs: Sequence[Run], relaxation_time: float) -> list[PossibleTest]:
     imposed = np.full(_SAMPLES, stress)
     # only sets the pace of integration, which a creep of unknown speed must not make endless
     strain = np.minimum(rates[fastest] * times, _STRAIN)
-    run = Run(
-        "creep", times, imposed_stress(times, imposed), np.zeros(_SAMPLES), imposed, strain=strain
-    )
-    return [PossibleTest(f"creep at {stress:.3g} Pa", run)]
+    protocol, title = imposed_stress(times, imposed), f"creep at {stress:.3g} Pa"
+    return [Run(title, times, protocol, np.zeros(_SAMPLES), imposed, strain=strain)]
 
 
 DECISIVE = 5.0
@@ -274,7 +244,7 @@ def design(posterior: Posterior) -> NextTests:
     longest = float(np.max(np.asarray(problem.declared.relaxation_time)))
     tests = possible_tests(runs, longest)
 
-    def weigh(tests: Sequence[PossibleTest], thetas: Sequence[Sequence[np.ndarray]]):
+    def weigh(tests: Sequence[Run], thetas: Sequence[Sequence[np.ndarray]]):
         for test, predicted in zip(tests, _predicted(posterior, thetas, tests), strict=True):
             one = _expected_of(test, predicted, share, noise, fresh, problem.loading)
             if one is not None:
@@ -285,7 +255,7 @@ def design(posterior: Posterior) -> NextTests:
     if kept:
         fastest = max(kept, key=lambda run: float(np.max(np.abs(run.rate))))
         for title, changed in _elsewhere(posterior):
-            again = PossibleTest(f"{fastest.name} again, {title}", fastest)
+            again = replace(fastest, name=f"{fastest.name} again, {title}")
             found += weigh([again], [[changed(theta) for theta in some] for some in varied])
     found.sort(key=lambda one: -round(one.nats, 2))  # the simplest first among equals
     names = tuple(fit.names for fit, _ in weighed)
@@ -308,7 +278,7 @@ def _varied(fit: Fit) -> list[Float[np.ndarray, " p"]]:
 
 
 def _predicted(
-    posterior: Posterior, thetas: Sequence[Sequence[np.ndarray]], tests: Sequence[PossibleTest]
+    posterior: Posterior, thetas: Sequence[Sequence[np.ndarray]], tests: Sequence[Run]
 ) -> Iterator[list[Float[np.ndarray, "_ n"]]]:
     """Return what each hypothesis predicts of each test, with its variations."""
     if not tests:
@@ -316,9 +286,9 @@ def _predicted(
     flat = np.array([theta for some in thetas for theta in some])
     ends = np.cumsum([len(some) for some in thetas])[:-1]
     with np.errstate(all="ignore"):
-        found = posterior.problem.model.predictions(flat, make_batch([t.run for t in tests]))
+        found = posterior.problem.model.predictions(flat, make_batch(tests))
     for i, test in enumerate(tests):
-        yield np.split(found[:, i, : len(test.run)], ends)
+        yield np.split(found[:, i, : len(test)], ends)
 
 
 def _elsewhere(
@@ -351,7 +321,7 @@ def _elsewhere(
 
 
 def _expected_of(
-    test: PossibleTest,
+    test: Run,
     predicted: Sequence[Float[np.ndarray, "_ n"]],
     share: Float[np.ndarray, " e"],
     noise: float,
@@ -365,7 +335,7 @@ def _expected_of(
     curves = np.stack([of[0] for of in predicted])
     if not np.all(np.isfinite(curves)):
         return None
-    is_flow_curve = test.run.protocol.control == "steady"
+    is_flow_curve = test.protocol.control == "steady"
     size = np.abs(curves[0]) if is_flow_curve else rms(curves[0])
     scale = np.maximum(noise * size, np.finfo(float).tiny) / np.sqrt(fresh)
     factors = [_factor(of / scale) for of in predicted]
@@ -379,8 +349,8 @@ def _expected_of(
             apart = 0.5 * squared_distance((curves[i] - curves[j]) / scale, factor)
             evidence[i, j] = evidence[j, i] = min(apart, _MOST_EVIDENCE)
     nats = float(-share @ np.log(np.exp(-0.25 * evidence) @ share))
-    samples = test.run.rate if is_flow_curve else test.run.time
-    return NextTest(test.title, test.run.quantity, nats, evidence, samples, curves, is_flow_curve)
+    samples = test.rate if is_flow_curve else test.time
+    return NextTest(test.name, test.quantity, nats, evidence, samples, curves, is_flow_curve)
 
 
 def _factor(group: Float[np.ndarray, "varied n"]) -> Float[np.ndarray, "k n"]:
