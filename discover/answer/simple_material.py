@@ -1,17 +1,24 @@
 """A yield stress, a viscous fluid, a solid: words, equations and exports of a simple material."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
+from discover.answer.answer import Answer
 from discover.answer.constant import Constant
+from discover.answer.parts import ExpectedError, Range
 from discover.dataset import Run
-from discover.equations.formats.rheotool import viscous_fluid
+from discover.equations.files import read_result
+from discover.equations.formats.rheotool import DENSITY, viscous_fluid
+from discover.errors import InputError
 from discover.inference.engine.closed_forms import recorded, viscosity
 from discover.inference.engine.simple_materials import SimpleFit, describes
+from discover.plain_numbers import json_text
+from discover.words import unknown_name
 
 Kind = Literal["yield_stress", "viscous", "solid"]
 
@@ -42,7 +49,7 @@ class SimpleMaterial:
         numbers = [f"{one.value:.6g}" for one in self.constants]
         found = {
             "python": "".join(f"# {line}\n" for line in comments)
-            + f"\n{_PYTHON[self.law](numbers)}",
+            + f"\n{_PYTHON[self.law].format(*numbers)}",
             "latex": "".join(f"% {line}\n" for line in comments) + f"\\[{self.latex}\\]\n",
         }
         if self.law in _RHEOTOOL:
@@ -95,44 +102,35 @@ _NAMES: dict[str, tuple[Kind, str, dict[str, str]]] = {
     ),
 }  # fmt: skip
 
-_LATEX: dict[str, Callable[[Sequence[str]], str]] = {
-    "newtonian": lambda v: rf"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {v[0]}",
-    "herschel_bulkley": lambda v: (
-        r"|\sigma_{12}| = \tau_y + K|\dot\gamma|^n\ \mathrm{where}\ |\sigma_{12}| > \tau_y,\quad "
-        r"\dot\gamma = 0\ \mathrm{elsewhere}, \qquad "
-        rf"\tau_y = {v[0]},\; K = {v[1]},\; n = {v[2]}"
+# Law typeset, and as a function of Python, with places for the constants in their order
+_LATEX = {
+    "newtonian": r"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {}",
+    "herschel_bulkley": (
+        r"|\sigma_{{12}}| = \tau_y + K|\dot\gamma|^n\ \mathrm{{where}}\ |\sigma_{{12}}| > \tau_y,"
+        r"\quad \dot\gamma = 0\ \mathrm{{elsewhere}}, \qquad \tau_y = {},\; K = {},\; n = {}"
     ),
-    "power_law": lambda v: (
-        r"\sigma_{12} = K|\dot\gamma|^{n-1}\dot\gamma, \qquad "
-        rf"K = {v[0]},\; n = {v[1]}"
+    "power_law": (r"\sigma_{{12}} = K|\dot\gamma|^{{n-1}}\dot\gamma, \qquad K = {},\; n = {}"),
+    "carreau_yasuda": (
+        r"\sigma_{{12}} = \left(\eta_\infty + (\eta_0 - \eta_\infty)"
+        r"(1 + (k|\dot\gamma|)^a)^{{(n-1)/a}}\right)\dot\gamma, \qquad "
+        r"\eta_0 = {},\; \eta_\infty = {},\; k = {},\; n = {},\; a = {}"
     ),
-    "carreau_yasuda": lambda v: (
-        r"\sigma_{12} = \left(\eta_\infty + (\eta_0 - \eta_\infty)"
-        r"(1 + (k|\dot\gamma|)^a)^{(n-1)/a}\right)\dot\gamma, \qquad "
-        rf"\eta_0 = {v[0]},\; \eta_\infty = {v[1]},\; k = {v[2]},\; n = {v[3]},\; a = {v[4]}"
-    ),
-    "kelvin_voigt": lambda v: (
-        rf"\sigma_{{12}} = G\gamma + \eta\,\dot\gamma, \qquad G = {v[0]},\; \eta = {v[1]}"
-    ),
+    "kelvin_voigt": r"\sigma_{{12}} = G\gamma + \eta\,\dot\gamma, \qquad G = {},\; \eta = {}",
 }
 
-_PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
-    "newtonian": lambda v: f"def stress(rate):\n    return {v[0]} * rate\n",
-    "herschel_bulkley": lambda v: (
-        f"def stress(rate):\n    # of a rate above zero; no flow up to a stress of {v[0]} Pa\n"
-        f"    return {v[0]} + {v[1]} * rate ** {v[2]}\n"
+_PYTHON = {
+    "newtonian": "def stress(rate):\n    return {} * rate\n",
+    "herschel_bulkley": (
+        "def stress(rate):\n    # of a rate above zero; no flow up to a stress of {0} Pa\n"
+        "    return {0} + {1} * rate ** {2}\n"
     ),
-    "power_law": lambda v: (
-        f"def stress(rate):\n    return {v[0]} * abs(rate) ** ({v[1]} - 1) * rate\n"
-    ),
-    "carreau_yasuda": lambda v: (
+    "power_law": "def stress(rate):\n    return {} * abs(rate) ** ({} - 1) * rate\n",
+    "carreau_yasuda": (
         "def stress(rate):\n"
-        f"    thinned = (1 + ({v[2]} * abs(rate)) ** {v[4]}) ** (({v[3]} - 1) / {v[4]})\n"
-        f"    return ({v[1]} + ({v[0]} - {v[1]}) * thinned) * rate\n"
+        "    thinned = (1 + ({2} * abs(rate)) ** {4}) ** (({3} - 1) / {4})\n"
+        "    return ({1} + ({0} - {1}) * thinned) * rate\n"
     ),
-    "kelvin_voigt": lambda v: (
-        f"def stress(strain, rate):\n    return {v[0]} * strain + {v[1]} * rate\n"
-    ),
+    "kelvin_voigt": "def stress(strain, rate):\n    return {} * strain + {} * rate\n",
 }
 
 
@@ -158,8 +156,49 @@ def material_of(found: SimpleFit) -> SimpleMaterial:
         Constant(name, value, ends, unit)
         for (name, unit), value, ends in zip(names.items(), found.values, found.ci95, strict=True)
     )
-    latex = _LATEX[found.law]([f"{value:.6g}" for value in found.values])
+    latex = _LATEX[found.law].format(*(f"{value:.6g}" for value in found.values))
     formula = latex.partition(r", \qquad ")[0]
     return SimpleMaterial(
         kind, title, found.law, constants, found.error, formula, latex, found.onset
     )
+
+
+def simple_material_text(folder: str | Path, form: str, density_kg_m3: float | None) -> str | None:
+    """Return a yield-stress fluid, a viscous fluid or a solid as text; None for another law.
+
+    `form`: ``python``, ``latex``, ``rheotool`` or ``json``. Raises InputError if there is no
+    result, it is damaged, or the format has no such material.
+    """
+    content, name = read_result(folder)
+    use = content.get("use") if isinstance(content, dict) else None
+    if not isinstance(use, dict):
+        return None
+    try:
+        answer, written = _written(use, density_kg_m3 or DENSITY)
+    except KeyError as error:
+        if error.args == (use.get("law"),):  # no simple material
+            return None
+        raise InputError(f"{name}: `use` lacks {error}. Run again with --overwrite.") from None
+    except (TypeError, ValueError, AttributeError, ArithmeticError):
+        raise InputError(f"{name}: `use` is damaged. Run again with --overwrite.") from None
+    texts = written | {"json": json_text(use)}
+    if form not in texts:
+        raise InputError(unknown_name("format", form, texts, f"A {answer.title}"))
+    return texts[form]
+
+
+def _written(use: dict[str, Any], density: float) -> tuple[Answer, dict[str, str]]:
+    constants: list[Any] = list(dict(use["constants"]).values())
+    values = tuple(float(one["value"]) for one in constants)
+    both = ((one["ci95"] or (one["value"],) * 2) for one in constants)
+    ends = tuple((float(low), float(high)) for low, high in both)
+    material = material_of(SimpleFit(use["law"], values, ends, 0.0, 0.0))
+    rates = use["range"]["rate_1_s"]
+    found = Range(rate_1_s=None if rates is None else (float(rates[0]), float(rates[1])))
+    error = use["expected_error"]["sigma12"]
+    expected = {} if error is None else {"sigma12": ExpectedError(float(error))}
+    answer = Answer(
+        material.title, material.law, material.constants, range=found, expected_error=expected
+    )
+    slowest = 0.0 if found.rate_1_s is None else found.rate_1_s[0]
+    return answer, material.written(answer.lines, slowest, density)

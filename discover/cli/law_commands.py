@@ -118,7 +118,7 @@ def export(
     overwrite: Annotated[bool, Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
-    from discover.answer.exported import simple_material_text
+    from discover.answer.simple_material import simple_material_text
     from discover.equations.files import choose_law, read_result_laws, write_equation
     from discover.first_use import enable_x64
     from discover.study.atomic import make_folder, replaceable, write_text
