@@ -11,7 +11,7 @@ from discover.comparison.flows import QUANTITIES
 from discover.comparison.run_comparison import compare
 from discover.compilation_cache import enable_compilation_cache
 from discover.first_use import enable_x64
-from discover.report.plots.comparison.flows import curves
+from discover.report.plots.comparison import curves
 from discover.report.plots.style import Picture, figure, last_cycle, legend_above, picture
 from discover.study.data import read_study
 from discover.words import FIGURE_SYMBOLS

@@ -22,7 +22,7 @@ from discover.report.comparison.report import write_comparison
 from discover.report.first_screen import answer_screen
 from discover.report.loop import write_loop
 from discover.report.page import made_by, render
-from discover.report.plots.comparison.flows import drawn_records
+from discover.report.plots.comparison import drawn_records
 from discover.report.plots.loop.runs import FITTED_LAW, drawn_runs
 from discover.report.plots.style import Picture, picture
 from discover.study.run_folder import RunFolder

@@ -22,8 +22,13 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows, learner_lines
 from discover.report.page import safe_name
-from discover.report.plots.comparison.flows import curves, flow_picture, training_picture
-from discover.report.plots.comparison.oscillations import error_map_picture, third_harmonic
+from discover.report.plots.comparison import (
+    curves,
+    error_map_picture,
+    flow_picture,
+    third_harmonic,
+    training_picture,
+)
 from discover.report.plots.style import SPARSE, style_sheet
 from discover.report.wording import percent
 from discover.study import RunFolder, parse_study

@@ -6,7 +6,7 @@ from scipy.special import jv
 
 from discover.laws import Fluid, make_law
 from discover.protocols import oscillatory_shear
-from discover.report.plots.comparison.oscillations import third_harmonic
+from discover.report.plots.comparison import third_harmonic
 from discover.simulate import simulate
 
 DEBORAH = 50.0

@@ -15,8 +15,13 @@ from discover.report.comparison import tables
 from discover.report.comparison.tables import learner_lines
 from discover.report.first_screen import answer_screen
 from discover.report.page import Missing, attempt, made_by, render, safe_name
-from discover.report.plots.comparison.flows import flow_picture, start_up_picture, training_picture
-from discover.report.plots.comparison.oscillations import error_map_picture, high_deborah_picture
+from discover.report.plots.comparison import (
+    error_map_picture,
+    flow_picture,
+    high_deborah_picture,
+    start_up_picture,
+    training_picture,
+)
 from discover.report.plots.style import Picture
 from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
 from discover.study.run_folder import RunFolder

@@ -1,6 +1,6 @@
-"""Stresses in one flow: against time, as Lissajous curves, and in start-up."""
+"""Pictures of a comparison: stresses in each flow, and oscillations over Wi and De."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -10,6 +10,7 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
 from discover.report.plots import style as look
+from discover.report.wording import percent
 from discover.words import FIGURE_SYMBOLS, listed
 
 START_UP_SHOWN = 10.0
@@ -60,20 +61,13 @@ def flow_picture(comparison: Comparison, flow: Flow) -> look.Picture:
         seen = "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
     with look.figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
-            for label, style, stresses in curves(comparison, flow):
-                if quantity in stresses:
-                    row[0].plot(flow.times, stresses[quantity], label=label, **style)
-                    for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
-                        panel.plot(along, stresses[quantity][last], **style)
-            _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
+            _draw_stress(row[0], comparison, flow, quantity, slice(None), flow.times)
             if flow.training_end is not None and flow.training_end < flow.times[-1]:
                 span = flow.times[0], flow.training_end
                 row[0].axvspan(*span, color=look.SHADE, lw=0, label="training times", zorder=0)
             _mark_open(row[0], comparison, flow, quantity)
-            _frame(row[0], comparison, flow, quantity, flow.times >= 0)
             for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
-                _draw_band(panel, comparison, flow, quantity, last, along)
-                _frame(panel, comparison, flow, quantity, last)
+                _draw_stress(panel, comparison, flow, quantity, last, along)
             row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
         axes[-1, 0].set_xlabel(time_label)
         beyond = "" if comparison.placement(flow).inside else ", beyond range"
@@ -106,12 +100,8 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> look.Picture:
         if not flow.is_truth:
             shown = np.ones_like(shown)
         for panel, quantity in zip(axes[0], quantities, strict=True):
-            for label, style, stresses in curves(comparison, flow):
-                if quantity in stresses:
-                    panel.plot(flow.along[shown], stresses[quantity][shown], label=label, **style)
-            _draw_band(panel, comparison, flow, quantity, shown)
+            _draw_stress(panel, comparison, flow, quantity, shown, flow.along[shown])
             _mark_open(panel, comparison, flow, quantity)
-            _frame(panel, comparison, flow, quantity, shown)
             drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
             panel.set_ylabel(FIGURE_SYMBOLS[drawn] + ("" if flow.records_strain else stress_unit))
             panel.set_xlabel(_axis_of(comparison, flow))
@@ -151,7 +141,7 @@ def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Fig
                 if prediction is not None:
                     style = {**look.learner_style(name), "label": learner_title(name)}
                     panel.plot(flow.along, prediction["sigma12"], **style)
-            _draw_band(panel, comparison, flow, "sigma12", slice(None))
+            _draw_band(panel, comparison, flow, "sigma12", slice(None), flow.along)
             panel.set_title(look.literal(flow.title), fontsize=8)
             _set_scales(panel, flow, "sigma12", truth_too=True)
             if flow.is_of_states:
@@ -165,12 +155,17 @@ def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Fig
         yield drawing
 
 
-def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
-    """Shade what the data leave open: the band of the posterior, and the members of an ensemble.
+def _draw_stress(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along) -> None:
+    """Draw all that is known of a stress against what is given of the samples shown."""
+    for label, style, stresses in curves(comparison, flow):
+        if quantity in stresses:
+            panel.plot(along, stresses[quantity][shown], label=label, **style)
+    _draw_band(panel, comparison, flow, quantity, shown, along)
+    _frame(panel, comparison, flow, quantity, shown)
 
-    Against time, of a flow curve the rate, or against what is given of the samples shown.
-    """
-    along = flow.along[shown] if along is None else along
+
+def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along) -> None:
+    """Shade what the data leave open: the band of the posterior, and the members of an ensemble."""
     limits = []
     network = comparison.outcomes.get("tbnn_ude")
     members = None if network is None else network.bands.get(flow.key)
@@ -245,3 +240,120 @@ def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> N
     low, high = float(np.min(joined)), float(np.max(joined))
     margin = 0.15 * (high - low) or 1.0
     panel.set_ylim(low - margin, high + margin)
+
+
+def third_harmonic(stress: np.ndarray) -> float:
+    """Return I₃/I₁ of one cycle, sampled evenly with the end equal to the beginning.
+
+    Zero for an ellipse.
+    """
+    spectrum = np.abs(np.fft.rfft(stress[:-1]))
+    return float(spectrum[3] / spectrum[1]) if spectrum[1] > 0 else 0.0
+
+
+def high_deborah_picture(comparison: Comparison) -> look.Picture | None:
+    """Return Lissajous curves that become elliptical as De grows."""
+    stress_unit, _, rate_label = units(comparison)
+    panels = []
+    for flow in comparison.flows_of("high_deborah"):
+        # the first sample is rest at t = 0, the others one late cycle
+        drawn = [
+            (flow.rate[1:], stresses["sigma12"][1:], {**style, "label": label})
+            for label, style, stresses in curves(comparison, flow)
+            if "sigma12" in stresses
+        ]
+        harmonic = third_harmonic(flow.reference["sigma12"][1:])
+        deborah = float(np.max(np.asarray(flow.protocol.frequencies)))
+        settings = {
+            "title": f"De = {deborah:g}, I₃/I₁ = {100 * harmonic:.2g} %",
+            "xlabel": f"shear rate {rate_label}",
+            "ylabel": "" if panels else "σ₁₂" + stress_unit,
+        }
+        panels.append(look.Panel(drawn, settings))
+    caption = (
+        "γ̇ = 3 cos(De t), one cycle after the transient. As De grows the stress has no time to "
+        "change the structure within a cycle, and the strain, 3/De, falls: the curve becomes an "
+        "ellipse (quasi-linear LAOS) although the rate is large. A law that names the rate, such "
+        "as Johnson–Segalman's, would bend it at any De if the strain were above one. I₃/I₁ is "
+        "the third harmonic of the truth over the first."
+    )
+    return look.row_of_panels("high_deborah", caption, panels, 9.0, 2.8) if panels else None
+
+
+_STRONGEST = 0.55  # more would drown the number in the cell
+_TOLD = 10.0  # a larger relative error is no more than that in a cell
+_LOWEST, _HIGHEST = 1e-4, 1.0  # Relative errors at which the colour of a cell begins and ends
+
+Cells = Mapping[tuple[float, float], float | None]
+
+
+def error_map_picture(comparison: Comparison) -> look.Picture | None:
+    """Return the error of the known part and of each learner over Wi and De."""
+    if not comparison.flows_of("pipkin"):
+        return None
+    rows = {"before": "before", **{n: learner_title(n) for n in comparison.outcomes}}
+    with look.figure(len(rows), 3, width=10.0, height=2.5) as (drawing, axes):
+        for row, (who, title) in zip(axes, rows.items(), strict=True):
+            table = comparison.error_map(who)
+            for panel, quantity in zip(row, QUANTITIES, strict=True):
+                cells = {place: errors[quantity] for place, errors in table.items()}
+                _draw_cells(panel, cells, look.NETWORK)
+                panel.set_title(f"{FIGURE_SYMBOLS[quantity]}, {title}")
+                _mark_training(panel, comparison, cells)
+        _label(axes)
+        look.legend_above(drawing, axes)
+        return look.picture(
+            drawing,
+            "pipkin_error",
+            "Pipkin map of error: relative L2 error in one late cycle of γ̇ = Wi cos(De t), N₂'s "
+            "relative to N₁; a dash where the law diverges. Open circles: flows whose σ₁₂ the "
+            "learners saw. Away from them a law is an extrapolation.",
+        )
+
+
+def _draw_cells(panel, cells: Cells, colour: str) -> None:
+    """Draw one number a cell, the deeper the larger on a logarithmic scale."""
+    weissenberg, deborah = _axes_of(cells)
+    span = np.log(_HIGHEST / _LOWEST)
+    for (wi, de), value in cells.items():
+        x, y = deborah.index(de), weissenberg.index(wi)
+        share = 0.0 if value is None else np.log(max(value, 1e-300) / _LOWEST) / span
+        strength = float(np.clip(share, 0.0, 1.0))
+        panel.bar(x, 1.0, 1.0, y - 0.5, color=colour, alpha=strength * _STRONGEST, linewidth=0)
+        text = "∞" if value == np.inf else percent(value).replace(" %", "")
+        if value is not None and _TOLD < value < np.inf:
+            text = f"> {100 * _TOLD:.0f}"  # a rival on its way to running away
+        panel.text(x, y - 0.12, text, ha="center", va="center", fontsize=8, color=look.INK)
+    panel.set_xticks(range(len(deborah)), [f"{v:g}" for v in deborah])
+    panel.set_yticks(range(len(weissenberg)), [f"{v:g}" for v in weissenberg])
+    panel.set_xlim(-0.5, len(deborah) - 0.5)
+    panel.set_ylim(-0.5, len(weissenberg) - 0.5)
+    panel.grid(False)
+
+
+def _axes_of(cells: Cells) -> tuple[list[float], list[float]]:
+    return sorted({wi for wi, _ in cells}), sorted({de for _, de in cells})
+
+
+def _mark_training(panel, comparison: Comparison, cells: Cells) -> None:
+    """Mark the flows of training above the numbers, between cells where they lie on none."""
+    weissenberg, deborah = (np.asarray(v) for v in _axes_of(cells))
+    for flow in comparison.flows_of("training"):
+        if flow.oscillatory and flow.frequency:
+            x = np.interp(np.log(flow.frequency), np.log(deborah), np.arange(deborah.size))
+            y = np.interp(np.log(flow.amplitude), np.log(weissenberg), np.arange(weissenberg.size))
+            panel.plot(
+                x, y + 0.28, "o", ms=4.5, mfc="none", mew=1.0, color=look.TRUTH,
+                label="trained on (σ₁₂)",
+            )  # fmt: skip
+
+
+def _label(axes) -> None:
+    for panel in axes[-1]:
+        panel.set_xlabel("De = λω")
+    for panel in axes[:, 0]:
+        panel.set_ylabel("Wi = λγ̇₀")
+    for panel in axes.ravel():
+        panel.annotate(
+            "%", (1.0, 1.02), xycoords="axes fraction", ha="right", fontsize=8, color=look.INK
+        )
