@@ -23,13 +23,6 @@ from discover.plain_numbers import plain
 from discover.summary_view import Estimate, PageView, SummaryView, table_of
 from tensor_library.law_terms import LawTerm
 
-_VERDICTS: Mapping[str, FitVerdict] = {
-    "effects_added": "explained",
-    "no_effect_needed": "explained",
-    "unexplained": "unexplained",
-    "no_signal": "no_signal",
-}
-
 
 @dataclass(frozen=True)
 class Comparison(PageView, HasAnswer, SummaryView):
@@ -101,7 +94,10 @@ class Comparison(PageView, HasAnswer, SummaryView):
     @property
     def verdict(self) -> FitVerdict:
         """Whether a law with a sound or a named instrument describes the runs to the noise."""
-        return _VERDICTS[self.posterior.verdict]
+        verdict = self.posterior.verdict
+        if verdict == "effects_added" or verdict == "no_effect_needed":
+            return "explained"
+        return verdict
 
     @property
     def answer(self) -> Answer:

@@ -10,13 +10,12 @@ from scipy.integrate import cumulative_simpson
 
 from discover import protocols
 from discover.dataset.material_functions import as_compared
-from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
+from discover.dataset.records.thinning import without_spikes
 from discover.dataset.run import Run
 from discover.equations import law_terms
 from discover.errors import InputError
 from discover.forward.of_fluids import recorded_and_normal
 from discover.laws import Fluid, make_law
-from discover.learners.runs import waiting
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
@@ -318,20 +317,6 @@ def prepared(data: StudyData) -> StudyData:
             'such as held_out = ["fast.csv"].'
         )
     return with_runs(data, as_compared)
-
-
-def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
-    """Return data in which periodic starts have the cycles before them that learners wait for.
-
-    `relaxation_time`: the longest, in s. `relaxes`: whether the known law does, so that a periodic
-    state is solved for.
-    """
-    return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
-
-
-def thinned_to(data: StudyData, most: int) -> StudyData:
-    """Return data with each value once, and at most so many of each run, evenly in their order."""
-    return with_each_run(data, lambda run: thin_run(without_held_values(run), most))
 
 
 def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:

@@ -172,9 +172,6 @@ def _ratio(value: float, others: Sequence[float]) -> float:
     return value / largest if largest > 0.0 else float("inf") if value > 0.0 else 0.0
 
 
-_PHYSICS_FLOWS = ("training", "held_out", "test")
-
-
 def simulated(
     fluid: Fluid, flows: Sequence[Flow]
 ) -> tuple[dict[str, Stresses | None], identify.Seen]:
@@ -182,7 +179,7 @@ def simulated(
 
     None where the law diverges. Training flows set the box beyond which the law extrapolates.
     """
-    along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
+    along = [flow for flow in flows if flow.kind in DRAWN]
     training = [flow for flow in along if flow.kind == "training"] or along
     time = time_scale(fluid)
     weissenberg = time * max(flow.largest_rate for flow in training)
@@ -196,7 +193,7 @@ def simulated(
 
 def physics_of(seen: identify.Seen, flows: Sequence[Flow]) -> dict[str, Any]:
     """Return checks of a fluid's physical soundness along the flows, as JSON-able values."""
-    names = {i: flow.title for i, flow in enumerate(flows) if flow.kind in _PHYSICS_FLOWS}
+    names = {i: flow.title for i, flow in enumerate(flows) if flow.kind in DRAWN}
     return identify.check_physics(seen, names).to_json()
 
 

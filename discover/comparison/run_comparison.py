@@ -18,9 +18,8 @@ from discover.comparison.flows import (
     comparison_flows,
     prepared,
     require_one_known_law,
-    settled_by,
-    thinned_to,
     true_terms,
+    with_each_run,
     without_spikes_in_fit,
 )
 from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
@@ -29,10 +28,12 @@ from discover.comparison.learning import Learning, study_library
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
+from discover.dataset.records.thinning import thin_run, without_held_values
 from discover.dataset.run_table import material_and_temperature
 from discover.identify import Structure
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
+from discover.learners.runs import waiting
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
@@ -105,10 +106,13 @@ def compare(
     of_spikes = ""
     if made is None:  # estimators that are fitted already saw every sample
         data, of_spikes = without_spikes_in_fit(data)
-        data = thinned_to(data, options.most_samples)
+        most = options.most_samples
+        data = with_each_run(data, lambda run: thin_run(without_held_values(run), most))
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
-    data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
+    # a periodic start has the cycles before it that learners wait for
+    longest, relaxes = float(max(declared.relaxation_time)), declared.law.linear_relaxation
+    data = with_each_run(data, lambda run: waiting(run, longest, relaxes))
     pipkin = list(itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers))
     library = study_library(study) if library is None else library
     learning = Learning(study, options.seed if seed is None else seed, store, made)

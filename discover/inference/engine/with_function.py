@@ -1,6 +1,6 @@
 """Fits of hypotheses with a function of one variable beside them: curve, closed form or slip."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -112,9 +112,7 @@ class WithFunction(Fitter):
         grid = variable.grid(fit.predicted, _POINTS)
         size = 1.0 if variable.is_factor else variable.scale
         sizes, covariance = fit.linear[-k:], fit.covariance[-k:, -k:]
-        basis, x = size * variable.basis(grid), np.linspace(grid[0], grid[-1], k + 1)[1:]
-        nearest, _ = _nearest(variable, x, size * variable.basis(x), sizes, covariance)
-        return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
+        return _curve(variable, grid, lambda x: size * variable.basis(x), sizes, covariance)
 
     def closed(self, fits: Sequence[Fit]) -> "tuple[WithFunction, list[Fit]]":
         """Return hypotheses with the closed form that is nearest to the function of the first.
@@ -185,18 +183,23 @@ class WithSlip(Fitter):
         variable = Variable("slip", "stress", "Pa", None, float(grid[-1]), 1.0)
         at = [fit.free.index(position) for position in self._at]
         sizes, covariance = fit.theta[self._at], fit.covariance[np.ix_(at, at)]
-        basis, x = self._basis(grid), np.linspace(0.0, grid[-1], KNOTS + 1)[1:]
-        nearest, _ = _nearest(variable, x, self._basis(x), sizes, covariance)
-        return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
-
-    def _basis(self, stress: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n bends"]:
-        return SLIP_CURVE.basis(stress, self.problem.scales["stress"])
+        typical = self.problem.scales["stress"]
+        return _curve(variable, grid, lambda x: SLIP_CURVE.basis(x, typical), sizes, covariance)
 
 
-def _half_band(basis: Float[np.ndarray, "n k"], covariance: Float[np.ndarray, "k k"]):
-    """Return half of the 95 % band of a sum of columns."""
+def _curve(
+    variable: Variable,
+    grid: Float[np.ndarray, " n"],
+    basis_at: Callable[[np.ndarray], np.ndarray],
+    sizes: Float[np.ndarray, " k"],
+    covariance: Float[np.ndarray, "k k"],
+) -> tuple[Variable, list[np.ndarray], str | None]:
+    """Return a sum of columns with its grid, values and half 95 % band, and its closed form."""
+    basis, x = basis_at(grid), np.linspace(grid[0], grid[-1], KNOTS + 1)[1:]
     spread = basis @ np.linalg.cholesky(covariance)
-    return HALF_BAND * np.sqrt(np.sum(spread**2, axis=1))
+    half_band = HALF_BAND * np.sqrt(np.sum(spread**2, axis=1))
+    nearest, _ = _nearest(variable, x, basis_at(x), sizes, covariance)
+    return variable, [grid, basis @ sizes, half_band], nearest
 
 
 def _nearest(
