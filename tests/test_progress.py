@@ -94,7 +94,11 @@ def test_the_time_left_of_a_comparison_is_right_whether_it_compiles_or_not(compi
     whole = FollowedBy(
         lambda text, fraction: told.append(fraction), _DRAWING["compare"], clock, lambda: crowding
     )
-    times = ComparisonTime(whole, 3, False, False, clock, lambda: crowding, lambda: compiled)
+    searches = SearchTime(
+        3, False, held_out=False, reported=False, clock=clock, crowding=lambda: crowding,
+        compiled=lambda: compiled,
+    )  # fmt: skip
+    times = ComparisonTime(whole, searches)
     end = crowding * DEMO[compiled][-1][0]
     for at, what, *said in DEMO[compiled][:-1]:
         now = crowding * at  # the clock reads it

@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
-from discover.comparison.outcome import LearnerOutcome, physics_of, simulated
+from discover.comparison.outcome import LearnerOutcome, bands_of_members, physics_of, simulated
 from discover.dataset.run import Run
 from discover.laws import Fluid
 from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
@@ -107,9 +107,11 @@ class Learning:
                 learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
             )
         predictions, seen = simulated(fluid, flows)
-        outcome = LearnerOutcome.of(result, fluid, flows, predictions)
-        left = self._left(fluid, frame)
-        outcome = replace(outcome, physics=physics_of(seen, flows), left=left)
+        outcome = LearnerOutcome(
+            result.learner, result.terms, result.train_seconds, result.details, result.message,
+            predictions, physics_of(seen, flows),
+            bands_of_members(result, fluid, flows, predictions), self._left(fluid, frame),
+        )  # fmt: skip
         if store is not None:
             store.save(learner, outcome.to_state())
             # the same route as after an interruption, so that both give the same files

@@ -35,17 +35,6 @@ class LearnerOutcome(TermTables):
     bands: Mapping[str, Band] = field(default_factory=dict)
     left: LackOfFit | None = None  # of the runs that it learned from
 
-    @classmethod
-    def of(
-        cls, result: LearnerResult, fluid: Fluid, flows: list[Flow],
-        predictions: Mapping[str, Stresses | None],
-    ) -> "LearnerOutcome":  # fmt: skip
-        """Return the outcome of a fit, with what the fluid it found does in every flow."""
-        return cls(
-            result.learner, result.terms, result.train_seconds, result.details, result.message,
-            predictions, bands=_bands(result, fluid, flows, predictions),
-        )  # fmt: skip
-
     def to_state(self) -> dict[str, Any]:
         """Return everything as JSON-able values; `from_state` undoes it."""
         return plain(self)
@@ -73,9 +62,10 @@ class LearnerOutcome(TermTables):
         return cls(**{**state, **read})
 
 
-def _bands(
+def bands_of_members(
     result: LearnerResult, fluid: Fluid, flows: list[Flow], own: Mapping[str, Stresses | None]
 ) -> dict[str, Band]:
+    """Return what the members of an ensemble span, by flow; `own`: what the whole predicts."""
     if len(result.members) < 2:
         return {}
     others = [replace(fluid, law=law) for law in result.members if law is not result.law]

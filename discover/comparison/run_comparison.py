@@ -37,7 +37,7 @@ from discover.learners.runs import waiting
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
-from discover.loop.search_time import ComparisonTime
+from discover.loop.search_time import ComparisonTime, SearchTime
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data
@@ -118,7 +118,8 @@ def compare(
     learning = Learning(study, options.seed if seed is None else seed, store, made)
 
     several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
-    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out)
+    searches = SearchTime(MOST_EFFECTS, several, held_out=held_out, reported=False)
+    times = ComparisonTime(progress, searches)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
     simple = found.material() if made is None else None

@@ -67,7 +67,7 @@ class SearchTime:
         crowding: Callable[[], float] | None = None,
         compiled: Callable[[], float] = compiled_share,
     ):
-        self._crowding, self._clock, self._compiled = crowding or Crowding(), clock, compiled
+        self.crowding, self.clock, self.compiled = crowding or Crowding(), clock, compiled
         self._most, self._several_modes, self._rounds = most, several_modes, rounds
         self._weighing = _WEIGHED if held_out else _WEIGHED_ALONE
         self._reporting = [_CURVES, _BANDS][not curves :] if reported else []
@@ -121,13 +121,13 @@ class SearchTime:
         seconds = self._besides(self._reports)
         fits += (self._rounds - 1) * (self._done - self._round_before[0] + fits)
         seconds += (self._rounds - 1) * (self._seconds - self._round_before[1] + seconds)
-        passed, crowding = self._clock() - self._begun, self._crowding()
+        passed, crowding = self.clock() - self._begun, self.crowding()
         of_fits = max(passed - crowding * self._seconds, _SLOW * passed)
         return of_fits / self._done * fits + crowding * seconds
 
     def _search(self, candidates: float) -> None:
         """Begin a search, or a round."""
-        self._begun = self._clock() if self._begun is None else self._begun
+        self._begun = self.clock() if self._begun is None else self._begun
         if self._in_last:
             self._pass(self._reports)
             self._rounds, self._searches, self._in_last = self._rounds - 1, 0, False
@@ -155,7 +155,7 @@ class SearchTime:
         self._seconds += self._besides(parts)
 
     def _besides(self, parts: list[_Part]) -> float:
-        compiled = self._compiled()
+        compiled = self.compiled()
         return self._near * sum(part.seconds + compiled * part.compiling for part in parts)
 
 
@@ -168,26 +168,12 @@ _LEAST = 0.15  # Share of a part's expected time that is still told of it once t
 
 
 class ComparisonTime:
-    """Progress of a comparison; parameters as of `SearchTime`."""
+    """Progress of a comparison; `searches`: time of its search."""
 
-    def __init__(
-        self,
-        progress: Progress,
-        most: int,
-        several_modes: bool,
-        held_out: bool,
-        clock: Callable[[], float] = time.perf_counter,
-        crowding: Callable[[], float] | None = None,
-        compiled: Callable[[], float] = compiled_share,
-    ):
-        self._clock, self._crowding = clock, crowding or Crowding()
-        self._compiled = compiled
-        self._tell = by_time(progress, clock)
-        self._searches = SearchTime(
-            most, several_modes, held_out=held_out, reported=False, clock=clock,
-            crowding=self._crowding,
-        )  # fmt: skip
-        self._begun = self._since = clock()
+    def __init__(self, progress: Progress, searches: SearchTime):
+        self._searches, self._clock = searches, searches.clock
+        self._tell = by_time(progress, self._clock)
+        self._begun = self._since = self._clock()
         self._search = 0.0
         self._learn = self._weigh = 0.0
         self._weighs = False
@@ -229,8 +215,8 @@ class ComparisonTime:
         return self._clock() - self._since
 
     def _expect(self) -> None:
-        crowding = self._crowding()
+        crowding, compiled = self._searches.crowding(), self._searches.compiled()
         self._learn, self._weigh = (
-            (kept + self._compiled() * compiling) * crowding + share * self._search
+            (kept + compiled * compiling) * crowding + share * self._search
             for kept, compiling, share in (_LEARN, _WEIGH)
         )
