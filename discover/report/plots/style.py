@@ -13,12 +13,9 @@ import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.textpath import text_to_path
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from discover.dataset.run_table import wave_of
@@ -278,32 +275,13 @@ def legend_above(drawing: Figure, axes, columns: int = 4) -> None:
     for panel in axes.ravel():
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    if entries:
-        drawing.legend(
-            list(entries.values()),
-            list(entries),
-            loc="outside upper center",
-            ncols=_columns_within(drawing, list(entries), min(columns, len(entries))),
+    for count in range(min(columns, len(entries)), 0, -1):
+        legend = drawing.legend(
+            list(entries.values()), list(entries), loc="outside upper center", ncols=count
         )
-
-
-def _columns_within(drawing: Figure, labels: Sequence[str], most: int) -> int:
-    """Return how many columns of a legend are no wider than the figure, at least one."""
-    font = FontProperties(size=mpl.rcParams["legend.fontsize"])
-    size = font.get_size_in_points()
-    # in ems of the font: the handle, its distance from the text, and that between columns
-    ems = mpl.rcParams["legend.handlelength"] + mpl.rcParams["legend.handletextpad"]
-    handle = (ems + mpl.rcParams["legend.columnspacing"]) * size
-    widths = [
-        text_to_path.get_text_width_height_descent(label, font, is_math_text(label))[0]
-        for label in labels
-    ]
-    for count in range(most, 1, -1):
-        # a legend fills its columns one after the other, the first ones with what is left over
-        parts = np.array_split(widths, count)
-        if sum(max(part) + handle for part in parts) <= 72.0 * drawing.get_figwidth():
-            return count
-    return 1
+        if count == 1 or legend.get_window_extent().width <= drawing.bbox.width:
+            return
+        legend.remove()
 
 
 def literal(text: str) -> str:
