@@ -13,6 +13,7 @@ from discover.laws import Fluid
 from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
+from discover.plain_numbers import plain
 from discover.progress import Progress, silent
 from discover.study.declared_model import StudyModel
 from discover.study.run_folder import RunFolder
@@ -113,9 +114,10 @@ class Learning:
             bands_of_members(result, fluid, flows, predictions), self._left(fluid, frame),
         )  # fmt: skip
         if store is not None:
-            store.save(learner, outcome.to_state())
+            state = plain(outcome)
+            store.save(learner, state)
             # the same route as after an interruption, so that both give the same files
-            return LearnerOutcome.from_state(outcome.to_state())
+            return LearnerOutcome.from_state(state)
         return outcome
 
     def _left(self, fluid: Fluid, frame: Frame) -> LackOfFit | None:

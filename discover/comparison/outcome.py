@@ -13,7 +13,6 @@ from discover.laws import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.lack_of_fit import LackOfFit
 from discover.learners.results import TermTables
-from discover.plain_numbers import plain
 
 
 @dataclass(frozen=True)
@@ -35,13 +34,9 @@ class LearnerOutcome(TermTables):
     bands: Mapping[str, Band] = field(default_factory=dict)
     left: LackOfFit | None = None  # of the runs that it learned from
 
-    def to_state(self) -> dict[str, Any]:
-        """Return everything as JSON-able values; `from_state` undoes it."""
-        return plain(self)
-
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
-        """Return the outcome that was kept."""
+        """Return an outcome of its JSON-able values."""
 
         def arrays(values: Mapping[str, Any]) -> dict[str, np.ndarray]:
             return {name: np.asarray(one, dtype=float) for name, one in values.items()}

@@ -1,9 +1,9 @@
 """The report on a comparison: page, figures, JSON and LaTeX."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from markupsafe import Markup
 
@@ -77,18 +77,11 @@ SECTIONS: Mapping[tuple[str, str, str], Mapping[str, str]] = {
 parts by file in ``templates/comparison``, with what they are as the subject of a sentence."""
 
 
-@dataclass(frozen=True)
-class Section:
-    """A heading with what stands below it."""
+def sections(comparison: Comparison, linear_relaxation: bool) -> list[dict[str, Any]]:
+    """Return the sections between the pictures and how it was learned, without the empty ones.
 
-    anchor: str
-    heading: str
-    link: str
-    parts: tuple[str | Missing, ...]  # HTML, or what could not be drawn
-
-
-def sections(comparison: Comparison, linear_relaxation: bool) -> list[Section]:
-    """Return the sections between the pictures and how it was learned, without the empty ones."""
+    Each has its anchor, heading, link and parts: HTML, or what could not be drawn.
+    """
 
     def draw(template: str) -> str | None:
         text = render(
@@ -98,10 +91,10 @@ def sections(comparison: Comparison, linear_relaxation: bool) -> list[Section]:
         return Markup(text) if text.strip() else None
 
     drawn = []
-    for head, parts in SECTIONS.items():
+    for (anchor, heading, link), parts in SECTIONS.items():
         shown = [attempt(title, partial(draw, name)) for name, title in parts.items()]
-        if kept := tuple(part for part in shown if part is not None):
-            drawn.append(Section(*head, kept))
+        if kept := [part for part in shown if part is not None]:
+            drawn.append({"anchor": anchor, "heading": heading, "link": link, "parts": kept})
     return drawn
 
 

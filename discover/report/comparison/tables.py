@@ -184,17 +184,12 @@ def physics_checks(comparison: Comparison) -> dict[str, list[Mapping[str, Any] |
     return {name: [own.get(name) for own in reports] for name in names}
 
 
-def _titles(comparison: Comparison) -> dict[str, str]:
-    """Return the flows in the field's notation, by their names."""
-    return {flow.name: flow.title for flow in comparison.flows}
-
-
 _LAW_SPELLED = re.compile(r"^h = .*? (?=(?:leaves|gives|predicts) )")
 
 
 def rival_row(rival: Rival, comparison: Comparison) -> dict[str, Any]:
     """Return a law that the data do not tell from the one found."""
-    place, titles = rival.separated_by, _titles(comparison)
+    place, titles = rival.separated_by, {flow.name: flow.title for flow in comparison.flows}
     return {
         "math": sum_elements(rival.law.terms),
         # it stands above the sentence
