@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_simpson
 
 from discover import protocols
 from discover.dataset.material_functions import as_compared
-from discover.dataset.records.thinning import without_spikes
+from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
 from discover.dataset.run import Run
 from discover.equations import law_terms
 from discover.errors import InputError
@@ -317,6 +317,11 @@ def prepared(data: StudyData) -> StudyData:
             'such as held_out = ["fast.csv"].'
         )
     return with_runs(data, as_compared)
+
+
+def thinned_to(data: StudyData, most: int) -> StudyData:
+    """Return data with each value once, and at most so many of each run, evenly in their order."""
+    return with_each_run(data, lambda run: thin_run(without_held_values(run), most))
 
 
 def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:

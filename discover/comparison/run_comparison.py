@@ -18,6 +18,7 @@ from discover.comparison.flows import (
     comparison_flows,
     prepared,
     require_one_known_law,
+    thinned_to,
     true_terms,
     with_each_run,
     without_spikes_in_fit,
@@ -28,7 +29,6 @@ from discover.comparison.learning import Learning, study_library
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
-from discover.dataset.records.thinning import thin_run, without_held_values
 from discover.dataset.run_table import material_and_temperature
 from discover.identify import Structure
 from discover.laws import LAWS, Fluid
@@ -106,8 +106,7 @@ def compare(
     of_spikes = ""
     if made is None:  # estimators that are fitted already saw every sample
         data, of_spikes = without_spikes_in_fit(data)
-        most = options.most_samples
-        data = with_each_run(data, lambda run: thin_run(without_held_values(run), most))
+        data = thinned_to(data, options.most_samples)
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
     # a periodic start has the cycles before it that learners wait for

@@ -89,17 +89,15 @@ _NO_CURVE = _Curve(0.0, STIFFNESS[0], 0.0)
 class Member:
     """One discrepancy of the grid.
 
-    `curve`, `stiffness`, `growth`, `terms`: ρ over the noise, half swings, power of the rate, τ.
-    `which`, `correlation`: its curve in the grid, zero for none, and the correlation of the noise
-    beside it. `log_weight`: log of its probability among all of the hypothesis. `noise`: size of
-    the noise over the records. `mean`, `root`: of the constants and terms, in units of their
-    priors: the covariance is noise² root rootᵀ.
+    `curve`, `growth`: ρ over the noise, power of the rate. `which`, `correlation`: its curve in the
+    grid, zero for none, and the correlation of the noise beside it. `log_weight`: log of its
+    probability among all of the hypothesis. `noise`: size of the noise over the records. `mean`,
+    `root`: of the constants and terms, in units of their priors: the covariance is noise² root
+    rootᵀ.
     """
 
     curve: float
-    stiffness: float
     growth: float
-    terms: float
     which: int
     correlation: float
     log_weight: float
@@ -312,13 +310,9 @@ class Discrepancy:
                 break
             scale, _ = self._scale(*terms)
             mean, root = _posterior(self._products(correlation).gram[which], scale)
-            size, stiff, growth, *_ = self._grid[which - 1] if which else _NO_CURVE
+            size, _, growth, *_ = self._grid[which - 1] if which else _NO_CURVE
             log = float(weight - total)
-            members.append(
-                Member(
-                    size, stiff, growth, terms[0], which, correlation, log, float(noise), mean, root
-                )
-            )
+            members.append(Member(size, growth, which, correlation, log, float(noise), mean, root))
         return members, total - none
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
