@@ -1,7 +1,7 @@
 """Predictions of a posterior in the flows of a comparison: σ12, N1 and N2 with their 95 % bands."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -21,10 +21,13 @@ from discover.loop.loop import Found
 def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> dict[str, Band]:
     """Return the band of each flow, by its key; those in which most hypotheses diverge have none.
 
-    Runs are predicted as recorded, other flows for the fluid alone. `runs`: as recorded, by name.
+    Where no law is all there is, σ12 is that of laws which predict runs left out best, as in a
+    closed loop. These need not come nearest in N1 and N2, for which all count that describe the
+    runs about as well. Runs are predicted as recorded, other flows for the fluid alone. `runs`: as
+    recorded, by name.
     """
-    asked, laws = [flow_run(flow, found, runs) for flow in flows], weighed_laws(found.posterior)
-    out: dict[str, Band] = {}
+    posterior, asked = found.posterior, [flow_run(flow, found, runs) for flow in flows]
+    weighed, out = weighed_laws(posterior), {}
     for recorded in (True, False):
         some = [
             (flow, run)
@@ -32,12 +35,12 @@ def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> 
             if (flow.kind in MEASURED) is recorded
         ]
         if some:
-            rows = Rows.of([run for _, run in some])
-            bands = Predictions(found.posterior, rows, recorded).bands(laws)
-            for (flow, _), band in zip(some, bands, strict=True):
-                if band is not None:
-                    ends = (columns_of(one) for one in (band.middle, band.low, band.high))
-                    out[flow.key] = Band(*ends)
+            predictions = Predictions(posterior, Rows.of([run for _, run in some]), recorded)
+            of_stress, of_normal = map(predictions.bands, (posterior.predicting_best, weighed))
+            for (flow, _), first, others in zip(some, of_stress, of_normal, strict=True):
+                if first is not None and others is not None:
+                    ends = zip(astuple(first), astuple(others), strict=True)
+                    out[flow.key] = Band(*(columns_of(np.c_[a[:, :1], b[:, 1:]]) for a, b in ends))
     return out
 
 

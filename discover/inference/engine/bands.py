@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -86,16 +87,17 @@ class Predictions:
         there is: every stress is then missed as runs left out are, more beyond the fastest rate,
         and N2 is as likely anything from −2/7 N1 to zero.
         """
-        none = self.posterior.unexplained
-        parts: list[_Part] = []
-        for share, laws, is_none in (
-            (1.0 - none, self.posterior.fits, False),
-            (none, of_none, True),
-        ):
-            for fit, weight in laws:
-                if share * weight > _LEAST and fit.covariance is not None:
-                    parts += self._parts(fit, share * weight, is_none)
+        parts = [*self._of_fits, *self._of_laws(of_none, self.posterior.unexplained, True)]
         return [self._band(parts, i) for i in range(len(self.rows.runs))]
+
+    @cached_property
+    def _of_fits(self) -> list[_Part]:
+        return self._of_laws(self.posterior.fits, 1.0 - self.posterior.unexplained, False)
+
+    def _of_laws(self, laws: Laws, share: float, are_none: bool) -> list[_Part]:
+        likely = ((f, share * p) for f, p in laws if f.covariance is not None)
+        some = [(f, weight) for f, weight in likely if weight > _LEAST]
+        return [part for fit, weight in some for part in self._parts(fit, weight, are_none)]
 
     def followed(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return those of some hypotheses that run away in none of the runs."""

@@ -118,6 +118,11 @@ class Posterior:
                 found[id(fit)] = fit, share * weight + found.get(id(fit), (fit, 0.0))[1]
         return tuple(sorted(found.values(), key=lambda pair: -pair[1]))
 
+    @property
+    def predicting_best(self) -> list[tuple[Fit, float]]:
+        """Laws that predict runs left out best, for where none is all there is, with curves."""
+        return self.beside_curves(self.by_left_out or self.fits)
+
     def with_curves(self, curves: Sequence[FreeFunction]) -> "Posterior":
         """Return the posterior with functions among what may be there and has no name."""
         log_odds = float(np.logaddexp.reduce([curve.weight for curve in curves]))
@@ -213,8 +218,7 @@ class Posterior:
         rows = self.problem.predicted
         if rows is None:
             return []
-        of_none = self.beside_curves(self.by_left_out or self.fits)
-        return Predictions(self, rows, noise=True).bands(of_none)
+        return Predictions(self, rows, noise=True).bands(self.predicting_best)
 
 
 @in_one_thread
