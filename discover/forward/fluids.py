@@ -97,7 +97,7 @@ def observed_of_dynamics(
     def observe(stress, rate):
         return fluid.stress(stress.T, rate)
 
-    return _observed(_followed(make, numbers, protocol, grid, observe), protocol)
+    return observed_of_stress(_followed(make, numbers, protocol, grid, observe), protocol)
 
 
 def _followed(make, numbers, protocol: FlowProtocol, grid: IntegrationGrid, observe: Observe):
@@ -148,12 +148,16 @@ def _at_given_stress(
 
 def _of_states(fluid, states: Float[Array, "n k s"], protocol: FlowProtocol, grid) -> Array:
     gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
-    return _observed(jax.vmap(fluid.stress)(states, gradient), protocol)
+    return observed_of_stress(jax.vmap(fluid.stress)(states, gradient), protocol)
 
 
-def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Array, "n 3"]:
-    s11, s22, s33, _ = stress.T
-    return jnp.stack([protocol.recorded_stress(stress.T), s11 - s22, s22 - s33], axis=-1)
+def observed_of_stress(
+    stress: Float[Array, "n 4 *c"], protocol: FlowProtocol
+) -> Float[Array, "n 3 *c"]:
+    """Return what is recorded of σ11, σ22, σ33, σ12 in Pa, N1 and N2."""
+    s11, s22, s33, s12 = jnp.moveaxis(stress, 1, 0)
+    recorded = protocol.recorded_stress(jnp.stack([s11, s22, s33, s12]))
+    return jnp.stack([recorded, s11 - s22, s22 - s33], axis=1)
 
 
 def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:

@@ -31,7 +31,6 @@ from discover.forward.side_by_side import (
     StressSideBySide,
     code_of,
 )
-from discover.laws import LAWS
 from discover.protocols.kinematics import Kinematics
 
 
@@ -54,9 +53,6 @@ class Program:
         self.averages = [e for e in structure.effects if isinstance(e, RadialAverage)]
         self._of_torque = [effect for effect in self._signal if not effect.of_force]
         self.of_force = [e for e in self._signal if e.of_force and e.acts_on_steady_states]
-        # a name does not tell one law from another that was registered under it in its place
-        build = LAWS[structure.law_name].build if structure.free_parameters else None
-        self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
@@ -84,20 +80,20 @@ class Program:
     def _in_lanes(
         self, numbers: Numbers, control: type, flow: Kinematics | None, choices: dict[str, bool]
     ):
-        given, made_from = (self.fluid, numbers, flow), self._made_from
+        given = self.fluid, numbers, flow
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
-            return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
+            return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own)
         if control is PeriodicFlows:
             code = code_of(PeriodicCode, *given)
             own = self._periodic_rates, self._given_way, self._moduli_recorded
             in_cycles = partial(code_of, Kernel, *given, cycles=True)
-            return PeriodicSideBySide(self.fluid, code, in_cycles, *own, made_from)
+            return PeriodicSideBySide(self.fluid, code, in_cycles, *own)
         if control is StressFlows:
             code = code_of(StressCode, *given)
-            return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
+            return StressSideBySide(self.fluid, code, self._driven_with_series)
         kernel = code_of(Kernel, *given, **choices)
-        return SideBySide(self.fluid, kernel, self._rates, self._distorted, made_from)
+        return SideBySide(self.fluid, kernel, self._rates, self._distorted)
 
     def _rates(self, theta, present, run):
         """Return the felt rate at half steps and the tool's at steps, by the effects present.

@@ -22,6 +22,7 @@ from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
+from discover.laws.each_mode import over_modes
 from discover.programs import compiled
 from discover.protocols.protocol import stack_protocols
 from discover.summary_view import NotebookView
@@ -293,16 +294,17 @@ def _readable(rows: np.ndarray) -> np.ndarray:
 def _arrivals(law, protocols, grids):
     """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0) at the samples, (runs, n, 3)."""
 
+    def of_mode(law, state, gradient):
+        def along(direction):
+            return jax.jvp(lambda s: law.stress_rate(s, gradient), (state[:, 0],), (direction,))
+
+        value, changes = jax.vmap(along, in_axes=1, out_axes=(None, 1))(state[:, 1:])
+        return jnp.concatenate([value[:, None], changes], axis=1)
+
     def one(protocol, grid):
         alone = dynamics_of_fluid(Fluid.dimensionless(law), protocol)
-
-        def slope(state, rate):
-            stress, changes = state[:, 0], state[:, 1:]
-            value, push = jax.linearize(lambda s: alone.slope(s, rate), stress)
-            along = jax.vmap(push, in_axes=1, out_axes=1)(changes)
-            return jnp.concatenate([value[:, None], along], axis=1)
-
-        beside = alone._replace(slope=slope, columns=3)
+        of_modes = jax.jit(over_modes(of_mode, law, -1))  # traced once for all stages of a step
+        beside = alone._replace(slope=of_modes, columns=3)
         start = beside.rest().at[:3, 1:, 0].set(jnp.eye(3))
         return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
 

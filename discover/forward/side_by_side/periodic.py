@@ -216,11 +216,10 @@ class PeriodicSideBySide(StatePredictor):
         rates: Callable,
         given_way: Callable,
         recorded: Callable,
-        made_from: tuple,
     ):
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
         shaping = [e for e in acting if isinstance(e, KinematicEffect)]
-        super().__init__(fluid, code, made_from, shaping, rates, (0, None, None))
+        super().__init__(fluid, code, shaping, rates, (0, None, None))
         self._cycles = cycles
         self._states = self._amplitudes(e for e in fluid.states if e.acts_on_steady_states)
         self._series = self._amplitudes(fluid.series)
@@ -233,12 +232,8 @@ class PeriodicSideBySide(StatePredictor):
 
             return of
 
-        self._given_way = self._program(
-            "given way", of_solvent(given_way), (None, 0, 0, None, 0, 0)
-        )
-        self._recorded = self._program(
-            "moduli", of_solvent(recorded), (None, 0, 0, None, None, 0, 0)
-        )
+        self._given_way = self._program(of_solvent(given_way), (None, 0, 0, None, 0, 0))
+        self._recorded = self._program(of_solvent(recorded), (None, 0, 0, None, None, 0, 0))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials states 2"]:
         """Return both moduli."""

@@ -73,28 +73,24 @@ class MadeOnce:
 
 
 class LanePredictor:
-    """Predictions of one kind of flows for one structure of law and effects, in lanes.
+    """Predictions of one kind of flows for one structure of law and effects, in lanes."""
 
-    `made_from`: what tells the structure from another.
-    """
-
-    def __init__(self, fluid: AugmentedFluid, code: Any, made_from: tuple):
+    def __init__(self, fluid: AugmentedFluid, code: Any):
         self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
-        self._made_from = made_from
-        self._packed: Callable[..., Packed] = code.packing(fluid, made_from)
+        self._packed: Callable[..., Packed] = code.packing(fluid)
 
     def _amplitudes(self, effects: Iterable[AbstractEffect]) -> list[int]:
         return [self._fluid.slices[effect.name].start for effect in effects]
 
     def _program(
-        self, name: str, function: Callable, *axes: Sequence[int | None], vectors_to: Any = 0
+        self, function: Callable, *axes: Sequence[int | None], vectors_to: Any = 0
     ) -> Callable:
         """Return a program of a function mapped over axes, that of the vectors last."""
         *inner, outermost = axes
         for along in inner:
             function = jax.vmap(function, along)
         function = jax.vmap(function, outermost, vectors_to)
-        return compiled(function, (name, *self._made_from))
+        return compiled(function)
 
     def _by_eights(
         self,
@@ -145,14 +141,13 @@ class StatePredictor(LanePredictor):
         self,
         fluid: AugmentedFluid,
         code: Code,
-        made_from: tuple,
         shaping: Iterable[AbstractEffect],
         rates: Callable,
         *axes: Sequence[int | None],
     ):
-        super().__init__(fluid, code, made_from)
+        super().__init__(fluid, code)
         self._shaping = self._amplitudes(shaping)
-        self._rates = self._program(f"rates of {type(code).__name__}", rates, *axes)
+        self._rates = self._program(rates, *axes)
 
     def _eights(self, asked: Asked) -> Eights:
         places = in_whole_eights(len(asked.thetas))

@@ -226,15 +226,14 @@ class SteadySideBySide(StatePredictor):
         code: SteadyCode,
         rates: Callable,
         recorded: Callable,
-        made_from: tuple,
     ):
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
         shaping = [e for e in acting if isinstance(e, KinematicEffect)]
         axes = (None, None, 0), (0, None, None)
-        super().__init__(fluid, code, made_from, shaping, rates, *axes)
+        super().__init__(fluid, code, shaping, rates, *axes)
         self._distorting = self._amplitudes(e for e in acting if isinstance(e, SignalEffect))
         axes = (None, None, 0, 0, 0), (0, None, None, 0, 0)
-        self._recorded = self._program("steady records", recorded, *axes)
+        self._recorded = self._program(recorded, *axes)
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return what is recorded, see `Asked.whole`."""

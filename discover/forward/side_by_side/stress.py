@@ -244,11 +244,11 @@ class StressSideBySide(LanePredictor):
     Pa s², and the strain of what gives way in series.
     """
 
-    def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable, made_from: tuple):
-        super().__init__(fluid, code, made_from)
+    def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable):
+        super().__init__(fluid, code)
         signal = [e for e in fluid.structure.effects if isinstance(e, SignalEffect)]
         self._driving = self._amplitudes((*signal, *fluid.series))
-        self._driven = self._program("driven", driven, (None, 0), (0, None))
+        self._driven = self._program(driven, (None, 0), (0, None))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return strains, see `Asked.whole`."""

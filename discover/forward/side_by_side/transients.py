@@ -144,9 +144,8 @@ class SideBySide(LanePredictor):
         code: Kernel,
         rates: Callable,
         distorted: Callable,
-        made_from: tuple,
     ):
-        super().__init__(fluid, code, made_from)
+        super().__init__(fluid, code)
         self._in_numpy = rates, distorted
         effects, still = fluid.structure.effects, KinematicEffect.felt_rate
         shaping = [e for e in effects if isinstance(e, KinematicEffect)]
@@ -160,9 +159,9 @@ class SideBySide(LanePredictor):
             return distorted(theta, present, run, *signals)[run.sample_index]
 
         axes = (None, None, 0), (0, None, None)
-        self._rates = self._program("rates", rates, *axes, vectors_to=(-1, 0))
+        self._rates = self._program(rates, *axes, vectors_to=(-1, 0))
         axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
-        self._recorded = self._program("recorded", recorded, *axes)
+        self._recorded = self._program(recorded, *axes)
         self._runs, self._placed = MadeOnce(_runs), MadeOnce(_placed)
         self._known_table: tuple | None = None
 
