@@ -14,7 +14,6 @@ from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
 from discover.forward.pieces import in_pieces
 from discover.forward.rate_steps import RateSteps, rate_steps
-from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 
@@ -177,10 +176,10 @@ class StressFlows(eqx.Module):
     `sample_index`, `clock_factor`, `kinematics`: as in `TransientFlows`.
     """
 
-    times: Float[Array, "runs s"]  # step ends, shape (runs, s), in s
-    imposed: Float[Array, "runs s"]  # recorded stress there, in Pa
-    sample_index: Array
-    clock_factor: Float[Array, " runs"]
+    times: Float[np.ndarray, "runs s"]  # step ends, shape (runs, s), in s
+    imposed: Float[np.ndarray, "runs s"]  # recorded stress there, in Pa
+    sample_index: Int[np.ndarray, "runs n"]
+    clock_factor: Float[np.ndarray, " runs"]
     kinematics: Kinematics | None = None
 
 
@@ -199,7 +198,7 @@ def at_given_stress(runs: Sequence[Run], steps: Steps) -> StressFlows:
         imposed = shear_rates(run.protocol, padded)
         index = np.pad(index, (0, n_samples - len(run)), mode="edge")
         rows.append((padded, imposed, index, run.clock_factor))
-    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
+    columns = [np.stack(column) for column in zip(*rows, strict=True)]
     return StressFlows(
         *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
     )
@@ -208,7 +207,7 @@ def at_given_stress(runs: Sequence[Run], steps: Steps) -> StressFlows:
 class SteadyFlows(eqx.Module):
     """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate."""
 
-    rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
+    rate: Float[np.ndarray, "runs n"]  # in 1/s, shape (runs, n)
     kinematics: Kinematics | None = None  # as in `TransientFlows`
 
 
@@ -218,7 +217,7 @@ def steady_states(runs: Sequence[Run]) -> SteadyFlows:
     # a padded sample is one more of the last
     rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]
     kinematics = stack_kinematics([run.protocol.kinematics for run in runs])
-    return SteadyFlows(on_device(np.stack(rates)), kinematics)
+    return SteadyFlows(np.stack(rates), kinematics)
 
 
 # Half a cycle in the loop: as many steps as one of so much strain at least, whatever the strain
@@ -234,9 +233,9 @@ class PeriodicFlows(eqx.Module):
     `strain`, `frequency`: amplitude and rad/s.
     """
 
-    strain: Float[Array, " states"]
-    frequency: Float[Array, " states"]
-    steps: Int[Array, " states"]  # of half a cycle: more at large strain
+    strain: Float[np.ndarray, " states"]
+    frequency: Float[np.ndarray, " states"]
+    steps: Int[np.ndarray, " states"]  # of half a cycle: more at large strain
 
 
 def oscillations(runs: Sequence[Run], each: Steps) -> tuple[PeriodicFlows, tuple[Places, ...]]:
@@ -255,7 +254,7 @@ def oscillations(runs: Sequence[Run], each: Steps) -> tuple[PeriodicFlows, tuple
     strain, frequency = states.T
     most = each.strain / each.pieces
     steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), most) for one in strain]
-    return PeriodicFlows(*map(on_device, (strain, frequency, np.array(steps)))), places
+    return PeriodicFlows(strain, frequency, np.array(steps)), places
 
 
 Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
@@ -270,12 +269,11 @@ def at_radii(part: Flows, radii: Float[np.ndarray, " r"]) -> Flows | None:
     if isinstance(part, StressFlows) or getattr(part, "kinematics", None) is not None:
         return None
 
-    def repeated(leaf: ArrayLike) -> Array:
-        return on_device(np.concatenate([np.asarray(leaf)] * len(radii)))
+    def repeated(leaf: ArrayLike) -> np.ndarray:
+        return np.concatenate([np.asarray(leaf)] * len(radii))
 
-    def scaled(values: ArrayLike) -> Array:
-        values = np.asarray(values)
-        return on_device(np.concatenate([radius * values for radius in radii]))
+    def scaled(values: ArrayLike) -> np.ndarray:
+        return np.concatenate([radius * np.asarray(values) for radius in radii])
 
     many = jax.tree.map(repeated, part)
     if isinstance(part, PeriodicFlows):

@@ -1,8 +1,7 @@
 """Transients at a given rate of many vectors of parameters, eight side by side.
 
 Where a vector asks for it NumPy shapes the rate and distorts the signal, of all vectors and runs
-together; JAX does where an effect takes its arrays alone, for other flows than shear, and for steps
-of the rate at instants that are fitted.
+together.
 """
 
 from collections.abc import Callable
@@ -23,9 +22,9 @@ from discover.forward.side_by_side.predictors import (
     LanePredictor,
     MadeOnce,
     flows_of,
+    per_run,
 )
 from discover.forward.side_by_side.step import WEIGHTS
-from discover.programs import on_device
 from discover.programs.lanes import LANES
 
 # Vectors of the same times from which on weights of the steps are worth a table
@@ -35,40 +34,6 @@ _MANY = 8
 JUMP = 1e-9
 
 _OF_RUNS = ("last", "pieces", "cycle", "width", "share", "period", "jump", "flow")
-
-
-class _Signals(NamedTuple):
-    """Runs as effects on rates and signals take them, with an axis of runs, in arrays of NumPy.
-
-    `sample`: positions of the samples among step ends. The others as of `TransientFlows`.
-    """
-
-    times: np.ndarray
-    commanded_rate: np.ndarray
-    clock_factor: np.ndarray
-    strain_before: np.ndarray
-    sample: np.ndarray
-    kinematics: None = None
-    steps: None = None
-
-    @classmethod
-    def of(cls, part: TransientFlows) -> "_Signals":
-        """Return all runs of a part."""
-        times, rate, sample, clock, strain = map(
-            np.asarray,
-            (part.times, part.commanded_rate, part.sample_index, part.clock_factor,
-             part.strain_before),
-        )  # fmt: skip
-        return cls(times, rate, clock[:, None], strain[:, None], sample)
-
-    def of_first(self, runs: int) -> "_Signals":
-        """Return the first runs, which are no padding."""
-        times, rate, clock, strain, sample, *_ = self
-        return _Signals(times[:runs], rate[:runs], clock[:runs], strain[:runs], sample[:runs])
-
-
-def _before_runs(thetas: Float[np.ndarray, "lanes p"]) -> Float[np.ndarray, "p lanes 1 1"]:
-    return thetas.T[..., None, None]
 
 
 class _Runs(NamedTuple):
@@ -91,7 +56,7 @@ class _Runs(NamedTuple):
     share: np.ndarray
     jump: np.ndarray
     flow: np.ndarray  # kinematics of each run
-    signals: _Signals  # what effects on rates and signals take
+    flows: TransientFlows  # what effects on rates and signals take
     rate: np.ndarray
     tool_rate: np.ndarray
     in_shear: bool
@@ -118,24 +83,19 @@ def _runs(part: TransientFlows) -> _Runs:
         1.0 / pieces,
         JUMP * times[:, -1],
         flows_of(part.kinematics),
-        _Signals.of(part),
+        jax.tree.map(np.asarray, part),
         rate,
         tool_rate,
         flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
     )
 
 
-def _placed(part: TransientFlows) -> TransientFlows:
-    """Return runs as JAX holds them, so that they are handed over once."""
-    return jax.tree.map(on_device, part)
-
-
 class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
-    `rates`: of a vector, the effects present, and a run: the felt rate at ends and middles of
-    steps, and the tool's at ends. `distorted`: of these, the stress and both rates, what would be
-    recorded at ends.
+    `rates`: of vectors, the effects present, and runs: the felt rate at ends and middles of steps,
+    and the tool's at ends. `distorted`: of these, the stress and both rates, what would be recorded
+    at ends.
     """
 
     def __init__(
@@ -146,23 +106,13 @@ class SideBySide(LanePredictor):
         distorted: Callable,
     ):
         super().__init__(fluid, code)
-        self._in_numpy = rates, distorted
+        self._rates, self._distorted = rates, distorted
         effects, still = fluid.structure.effects, KinematicEffect.felt_rate
         shaping = [e for e in effects if isinstance(e, KinematicEffect)]
         shaping = [e for e in shaping if type(e).felt_rate is not still]
         distorting = [e for e in effects if isinstance(e, SignalEffect)]
         self._shaping, self._distorting = map(self._amplitudes, (shaping, distorting))
-        others = [e for e in (*shaping, *distorting) if not e.takes_numpy]
-        self._only_jax = self._amplitudes(others)
-
-        def recorded(theta, present, run, *signals):
-            return distorted(theta, present, run, *signals)[run.sample_index]
-
-        axes = (None, None, 0), (0, None, None)
-        self._rates = self._program(rates, *axes, vectors_to=(-1, 0))
-        axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
-        self._recorded = self._program(recorded, *axes)
-        self._runs, self._placed = MadeOnce(_runs), MadeOnce(_placed)
+        self._runs = MadeOnce(_runs)
         self._known_table: tuple | None = None
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
@@ -191,7 +141,7 @@ class SideBySide(LanePredictor):
         rate, tool_rate = laid_out.rate, laid_out.tool_rate
         is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
         if part.steps is not None or is_shaped:
-            rate, tool_rate = self._shaped(thetas, part, laid_out.signals)
+            rate, tool_rate = self._shaped(thetas, laid_out.flows)
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
@@ -200,7 +150,7 @@ class SideBySide(LanePredictor):
             **{name: getattr(laid_out, name) for name in _OF_RUNS},
         }  # fmt: skip
         stress, felt, of_modes = self._code(runs, declared, used, given, asked.whole)
-        places = np.arange(runs)[:, None], laid_out.signals.sample[:runs]
+        places = np.arange(runs)[:, None], laid_out.flows.sample_index[:runs]
         at_samples, beside = stress[places], []
         if asked.whole:
             own = (at_samples[:, :, None], of_modes[places])
@@ -209,40 +159,25 @@ class SideBySide(LanePredictor):
             return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
         beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
         felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
-        signals = laid_out.signals.of_first(runs)
-        found = self._at_samples(thetas, part, signals, stress, felt, tool_rate)
+        flows = jax.tree.map(lambda leaf: leaf[:runs], laid_out.flows)
+        found = self._at_samples(thetas, flows, stress, felt, tool_rate)
         return np.concatenate([found[..., None], *beside], axis=-1)
 
-    def _is_plain(self, thetas: np.ndarray, part: TransientFlows) -> bool:
-        plain = part.steps is None and part.kinematics is None
-        return plain and not np.any(thetas[:, self._only_jax])
-
-    def _shaped(
-        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _shaped(self, thetas: np.ndarray, flows: TransientFlows) -> tuple[np.ndarray, np.ndarray]:
         """Return the felt rate, lanes last, and the tool's, lanes first."""
-        present = self._fluid.present(thetas)
-        if not self._is_plain(thetas, part):
-            felt, of_tool = self._rates(thetas, present, self._placed(part))
-            return np.asarray(felt), np.asarray(of_tool)
-        found = self._in_numpy[0](_before_runs(thetas), present, signals)
+        found = self._rates(per_run(thetas), self._fluid.present(thetas), flows)
         felt, of_tool = (np.broadcast_to(of, (LANES, *of.shape[-2:])) for of in found)
         return np.ascontiguousarray(np.moveaxis(felt, 0, -1)), of_tool
 
     def _at_samples(
-        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals, stress, felt, of_tool
+        self, thetas: np.ndarray, flows: TransientFlows, stress, felt, of_tool
     ) -> Float[np.ndarray, "lanes runs n"]:
         """Return what samples record, of stress and felt rate at ends, lanes last."""
-        present, runs = self._fluid.present(thetas), len(signals.times)
-        if not self._is_plain(thetas, part):
-            found = self._recorded(thetas, present, self._placed(part), stress, felt, of_tool)
-            return np.asarray(found)[:, :runs]
+        present, runs = self._fluid.present(thetas), len(flows.times)
         given = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
         with np.errstate(all="ignore"):  # of a vector that runs away
-            found = self._in_numpy[1](
-                _before_runs(thetas), present, signals, *given, of_tool[:, :runs]
-            )
-        return found[:, np.arange(runs)[:, None], signals.sample]
+            found = self._distorted(per_run(thetas), present, flows, *given, of_tool[:, :runs])
+        return found[:, np.arange(runs)[:, None], flows.sample_index]
 
     def _table(
         self, numbers: Numbers, part: TransientFlows, time: float, count: int
