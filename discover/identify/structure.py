@@ -21,8 +21,8 @@ from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import (
     dynamics_of_fluid,
-    observed_of_dynamics,
     observed_of_stress,
+    samples_of_dynamics,
     with_cheap_tangents,
 )
 from discover.forward.of_fluids import pieces_in_time
@@ -91,7 +91,7 @@ def with_sensitivities(
             return dynamics_of_fluid(fluid, protocol)._replace(slope=over_modes(of_mode, law, -1))
 
         def observed(coefficients):
-            found = observed_of_dynamics(dynamics, coefficients, known, protocol, grid)
+            found = samples_of_dynamics(dynamics, coefficients, known, protocol, grid).observed
             return found, found
 
         columns, value = jax.jacfwd(observed, has_aux=True)(law.coefficients)
