@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
@@ -12,7 +13,6 @@ from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
-from discover.forward.pieces import in_pieces
 from discover.forward.rate_steps import RateSteps, rate_steps
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
@@ -23,6 +23,10 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
+
+# Steps in a row that are pieces of fewer: how many at least, into how many of one length they go,
+# how far their widths may differ for rounding, and rates from a straight line
+_MANY_IN_A_ROW, _SHARES, _ALIKE, _STRAIGHT = 8, 4, 1e-6, 1e-10
 
 # Least sizes of arrays that data sets share; of runs where they have no more steps than that
 _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
@@ -168,6 +172,38 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         steps=rate_steps(runs),
         cycle_steps=cycle_steps,
     )
+
+
+def in_pieces(
+    grid: Float[np.ndarray, " s"], index: Int[np.ndarray, " n"], run: Run
+) -> tuple[Float[np.ndarray, " m"], Int[np.ndarray, " n"], Int[np.ndarray, " pieces"]]:
+    """Return steps of which several in a row of a grid are pieces, and where samples stand.
+
+    Those are of one length, between two samples, and the commanded rate is a straight line in them.
+    The pieces of a step double in number, for it may begin with a jump, up to a share of them all.
+    """
+    if len(grid) < _MANY_IN_A_ROW:
+        return grid, index, np.ones(len(grid) - 1, np.int64)
+    width, rate = np.diff(grid), shear_rates(run.protocol, grid)
+    in_a_row = np.abs(np.diff(width)) <= _ALIKE * width[1:]
+    bend = np.abs(rate[2:] - 2.0 * rate[1:-1] + rate[:-2])
+    in_a_row &= bend <= _STRAIGHT * (np.abs(rate[2:]) + np.abs(rate[:-2]))
+    in_a_row = np.concatenate([[False], in_a_row, [False]])
+    in_a_row[index] = False
+    for step in run.rate_steps:  # one that is fitted is no straight line
+        in_a_row[(grid >= step.start) & (grid <= step.end)] = False
+    ends = np.flatnonzero(~in_a_row)
+    kept = ~in_a_row
+    for first, end in pairwise(ends):
+        if end - first < _MANY_IN_A_ROW:
+            kept[first:end] = True
+            continue
+        place, most = first, (end - first) // _SHARES
+        while place < end:
+            kept[place] = True
+            place += min(max(place - first, 1), most)
+    places = np.flatnonzero(kept)
+    return grid[places], np.searchsorted(places, index), np.diff(places)
 
 
 class StressFlows(eqx.Module):
