@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import numpy as np
 from jax.typing import ArrayLike
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
@@ -44,14 +44,14 @@ class TransientFlows(eqx.Module):
         has no periodic start.
     """
 
-    times: Float[Array | np.ndarray, "runs m"]
-    commanded_rate: Float[Array | np.ndarray, "runs m"]  # rate there, in 1/s
-    sample_index: Array | np.ndarray  # position of the samples among step ends, shape (runs, n)
-    clock_factor: Float[Array | np.ndarray, " runs"]  # shape (runs,)
-    strain_before: Float[Array | np.ndarray, " runs"]
-    cycle: Int[Array | np.ndarray, "runs 2"]
-    last_step: Int[Array | np.ndarray, " runs"]
-    pieces: Int[Array | np.ndarray, "runs s"]
+    times: Float[np.ndarray, "runs m"]
+    commanded_rate: Float[np.ndarray, "runs m"]  # rate there, in 1/s
+    sample_index: Int[np.ndarray, "runs n"]  # position of the samples among step ends
+    clock_factor: Float[np.ndarray, " runs"]  # shape (runs,)
+    strain_before: Float[np.ndarray, " runs"]
+    cycle: Int[np.ndarray, "runs 2"]
+    last_step: Int[np.ndarray, " runs"]
+    pieces: Int[np.ndarray, "runs s"]
     kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from discover.dataset import Run
 
@@ -19,11 +19,11 @@ class RateSteps(eqx.Module):
     not fitted.
     """
 
-    start: Float[Array | np.ndarray, "*runs steps"]
-    end: Float[Array | np.ndarray, "*runs steps"]
-    change: Float[Array | np.ndarray, "*runs steps"]  # of the rate in 1/s
-    share: Float[Array | np.ndarray, "*runs steps"]
-    place: Int[Array | np.ndarray, "*runs steps"]
+    start: Float[np.ndarray, "*runs steps"]
+    end: Float[np.ndarray, "*runs steps"]
+    change: Float[np.ndarray, "*runs steps"]  # of the rate in 1/s
+    share: Float[np.ndarray, "*runs steps"]
+    place: Int[np.ndarray, "*runs steps"]
 
     def in_rate(
         self,
