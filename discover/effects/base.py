@@ -319,6 +319,6 @@ class SignalEffect(AbstractEffect):
         del frequency
         return jnp.ones_like(values[0])
 
-    def inertia(self, values: Float[Array, " p"]) -> Float[Array, ""]:
+    def inertia(self, values: Values) -> OfRun:
         """Return I of σ_rec = σ + I dγ̇/dt in Pa s², which a given stress accelerates too."""
         return jnp.zeros_like(values[0])

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
+from scipy.integrate import cumulative_trapezoid
 
 from discover.effects import (
     AbstractEffect,
@@ -61,11 +62,13 @@ class Series(NamedTuple):
     slip: Float[Array, ""]
     compliance: Float[Array, ""]
 
-    def strain(self, times: Float[Array, " s"], imposed: Float[Array, " s"]) -> Float[Array, " s"]:
+    def strain(
+        self, times: Float[np.ndarray, "runs s"], imposed: Float[np.ndarray, "*vectors runs s"]
+    ) -> Float[np.ndarray, "vectors runs s"]:
         """Return their strain at times in s under a given stress in Pa."""
-        slipped = jnp.cumsum(0.5 * (imposed[1:] + imposed[:-1]) * jnp.diff(times))
-        given = self.compliance * (imposed - imposed[0])
-        return given + self.slip * jnp.concatenate([jnp.zeros(1), slipped])
+        slipped = cumulative_trapezoid(imposed, np.broadcast_to(times, imposed.shape), initial=0.0)
+        given = np.asarray(self.compliance) * (imposed - imposed[..., :1])
+        return given + np.asarray(self.slip) * slipped
 
 
 class OfModes(NamedTuple):
@@ -212,7 +215,7 @@ class AugmentedFluid:
         }
         return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
 
-    def in_series(self, theta, flow: Kinematics | None) -> Series | None:
+    def in_series(self, theta) -> Series | None:
         """Return what gives way in series with the fluid; None where there is no such effect.
 
         Slip that depends on the stress is left out.
@@ -220,8 +223,7 @@ class AugmentedFluid:
         if not self.series:
             return None
         pairs = [e.slip_and_compliance(self.values(theta, e)) for e in self.series]
-        both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
-        return Series(*where_in_shear(flow, both, jnp.zeros(2)))
+        return Series(*(jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)))
 
 
 def where_in_shear(flow: Kinematics | None, changed, unchanged):

@@ -146,18 +146,17 @@ def _after(told: Array, part: Any) -> Any:
 def lay_out(
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
-    n_samples: int = 0,
     relaxation_time: float | None = None,
     **limits: Any,
 ) -> FlowBatch:
     """Return flows with their grids, as many padded samples in each.
 
     Of an oscillation that had gone on for ever the periodic state is solved for if the fluid
-    relaxes; else the cycles with which its protocol begins are waited for. `n_samples`: least of
-    each. `relaxation_time`: longest of the fluid, in s; None where only what is learned relaxes.
-    `**limits`: of `make_grids`.
+    relaxes; else the cycles with which its protocol begins are waited for. `relaxation_time`:
+    longest of the fluid, in s; None where only what is learned relaxes. `**limits`: of
+    `make_grids`.
     """
-    n = max(n_samples, *(len(sampled) for sampled in times))
+    n = max(len(sampled) for sampled in times)
     parts, shown = [], []
     for control in dict.fromkeys(protocol.control for protocol in protocols):
         own = [i for i, protocol in enumerate(protocols) if protocol.control == control]

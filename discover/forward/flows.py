@@ -2,19 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax
 import numpy as np
 from jax.typing import ArrayLike
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
-from discover.forward.pieces import in_pieces
 from discover.forward.rate_steps import RateSteps, rate_steps
-from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 
@@ -24,6 +23,10 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
+
+# Steps in a row that are pieces of fewer: how many at least, into how many of one length they go,
+# how far their widths may differ for rounding, and rates from a straight line
+_MANY_IN_A_ROW, _SHARES, _ALIKE, _STRAIGHT = 8, 4, 1e-6, 1e-10
 
 # Least sizes of arrays that data sets share; of runs where they have no more steps than that
 _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
@@ -41,14 +44,14 @@ class TransientFlows(eqx.Module):
         has no periodic start.
     """
 
-    times: Float[Array | np.ndarray, "runs m"]
-    commanded_rate: Float[Array | np.ndarray, "runs m"]  # rate there, in 1/s
-    sample_index: Array | np.ndarray  # position of the samples among step ends, shape (runs, n)
-    clock_factor: Float[Array | np.ndarray, " runs"]  # shape (runs,)
-    strain_before: Float[Array | np.ndarray, " runs"]
-    cycle: Int[Array | np.ndarray, "runs 2"]
-    last_step: Int[Array | np.ndarray, " runs"]
-    pieces: Int[Array | np.ndarray, "runs s"]
+    times: Float[np.ndarray, "runs m"]
+    commanded_rate: Float[np.ndarray, "runs m"]  # rate there, in 1/s
+    sample_index: Int[np.ndarray, "runs n"]  # position of the samples among step ends
+    clock_factor: Float[np.ndarray, " runs"]  # shape (runs,)
+    strain_before: Float[np.ndarray, " runs"]
+    cycle: Int[np.ndarray, "runs 2"]
+    last_step: Int[np.ndarray, " runs"]
+    pieces: Int[np.ndarray, "runs s"]
     kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
@@ -171,16 +174,48 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
     )
 
 
+def in_pieces(
+    grid: Float[np.ndarray, " s"], index: Int[np.ndarray, " n"], run: Run
+) -> tuple[Float[np.ndarray, " m"], Int[np.ndarray, " n"], Int[np.ndarray, " pieces"]]:
+    """Return steps of which several in a row of a grid are pieces, and where samples stand.
+
+    Those are of one length, between two samples, and the commanded rate is a straight line in them.
+    The pieces of a step double in number, for it may begin with a jump, up to a share of them all.
+    """
+    if len(grid) < _MANY_IN_A_ROW:
+        return grid, index, np.ones(len(grid) - 1, np.int64)
+    width, rate = np.diff(grid), shear_rates(run.protocol, grid)
+    in_a_row = np.abs(np.diff(width)) <= _ALIKE * width[1:]
+    bend = np.abs(rate[2:] - 2.0 * rate[1:-1] + rate[:-2])
+    in_a_row &= bend <= _STRAIGHT * (np.abs(rate[2:]) + np.abs(rate[:-2]))
+    in_a_row = np.concatenate([[False], in_a_row, [False]])
+    in_a_row[index] = False
+    for step in run.rate_steps:  # one that is fitted is no straight line
+        in_a_row[(grid >= step.start) & (grid <= step.end)] = False
+    ends = np.flatnonzero(~in_a_row)
+    kept = ~in_a_row
+    for first, end in pairwise(ends):
+        if end - first < _MANY_IN_A_ROW:
+            kept[first:end] = True
+            continue
+        place, most = first, (end - first) // _SHARES
+        while place < end:
+            kept[place] = True
+            place += min(max(place - first, 1), most)
+    places = np.flatnonzero(kept)
+    return grid[places], np.searchsorted(places, index), np.diff(places)
+
+
 class StressFlows(eqx.Module):
     """Runs at a given stress on padded grids, with a leading axis of runs.
 
     `sample_index`, `clock_factor`, `kinematics`: as in `TransientFlows`.
     """
 
-    times: Float[Array, "runs s"]  # step ends, shape (runs, s), in s
-    imposed: Float[Array, "runs s"]  # recorded stress there, in Pa
-    sample_index: Array
-    clock_factor: Float[Array, " runs"]
+    times: Float[np.ndarray, "runs s"]  # step ends, shape (runs, s), in s
+    imposed: Float[np.ndarray, "runs s"]  # recorded stress there, in Pa
+    sample_index: Int[np.ndarray, "runs n"]
+    clock_factor: Float[np.ndarray, " runs"]
     kinematics: Kinematics | None = None
 
 
@@ -199,7 +234,7 @@ def at_given_stress(runs: Sequence[Run], steps: Steps) -> StressFlows:
         imposed = shear_rates(run.protocol, padded)
         index = np.pad(index, (0, n_samples - len(run)), mode="edge")
         rows.append((padded, imposed, index, run.clock_factor))
-    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
+    columns = [np.stack(column) for column in zip(*rows, strict=True)]
     return StressFlows(
         *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
     )
@@ -208,7 +243,7 @@ def at_given_stress(runs: Sequence[Run], steps: Steps) -> StressFlows:
 class SteadyFlows(eqx.Module):
     """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate."""
 
-    rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
+    rate: Float[np.ndarray, "runs n"]  # in 1/s, shape (runs, n)
     kinematics: Kinematics | None = None  # as in `TransientFlows`
 
 
@@ -218,7 +253,7 @@ def steady_states(runs: Sequence[Run]) -> SteadyFlows:
     # a padded sample is one more of the last
     rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]
     kinematics = stack_kinematics([run.protocol.kinematics for run in runs])
-    return SteadyFlows(on_device(np.stack(rates)), kinematics)
+    return SteadyFlows(np.stack(rates), kinematics)
 
 
 # Half a cycle in the loop: as many steps as one of so much strain at least, whatever the strain
@@ -234,9 +269,9 @@ class PeriodicFlows(eqx.Module):
     `strain`, `frequency`: amplitude and rad/s.
     """
 
-    strain: Float[Array, " states"]
-    frequency: Float[Array, " states"]
-    steps: Int[Array, " states"]  # of half a cycle: more at large strain
+    strain: Float[np.ndarray, " states"]
+    frequency: Float[np.ndarray, " states"]
+    steps: Int[np.ndarray, " states"]  # of half a cycle: more at large strain
 
 
 def oscillations(runs: Sequence[Run], each: Steps) -> tuple[PeriodicFlows, tuple[Places, ...]]:
@@ -255,7 +290,7 @@ def oscillations(runs: Sequence[Run], each: Steps) -> tuple[PeriodicFlows, tuple
     strain, frequency = states.T
     most = each.strain / each.pieces
     steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), most) for one in strain]
-    return PeriodicFlows(*map(on_device, (strain, frequency, np.array(steps)))), places
+    return PeriodicFlows(strain, frequency, np.array(steps)), places
 
 
 Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
@@ -270,12 +305,11 @@ def at_radii(part: Flows, radii: Float[np.ndarray, " r"]) -> Flows | None:
     if isinstance(part, StressFlows) or getattr(part, "kinematics", None) is not None:
         return None
 
-    def repeated(leaf: ArrayLike) -> Array:
-        return on_device(np.concatenate([np.asarray(leaf)] * len(radii)))
+    def repeated(leaf: ArrayLike) -> np.ndarray:
+        return np.concatenate([np.asarray(leaf)] * len(radii))
 
-    def scaled(values: ArrayLike) -> Array:
-        values = np.asarray(values)
-        return on_device(np.concatenate([radius * values for radius in radii]))
+    def scaled(values: ArrayLike) -> np.ndarray:
+        return np.concatenate([radius * np.asarray(values) for radius in radii])
 
     many = jax.tree.map(repeated, part)
     if isinstance(part, PeriodicFlows):

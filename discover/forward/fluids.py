@@ -18,7 +18,6 @@ from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.grid import IntegrationGrid
 from discover.forward.periodic_states import periodic_state
 from discover.forward.stepping import (
-    Observe,
     answer_to_stress,
     begun,
     follow,
@@ -51,57 +50,43 @@ class AtSamples(NamedTuple):
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
     """Return what is seen of a fluid in one flow. Not finite where it runs away."""
     make = partial(dynamics_of_fluid, protocol=protocol)
-    if protocol.control not in FOLLOWED:
-        return solved_on_grid(make, fluid, protocol, grid)
-    states = _followed(make, fluid, protocol, grid, lambda stress, _: stress.T)
-    rate = jax.vmap(protocol.rate)(grid.sample_times)
-    return AtSamples(_of_states(fluid, states, protocol, grid), states, rate)
+    return samples_of_dynamics(make, fluid, fluid, protocol, grid)
 
 
-def observed_on_grid(
-    fluid: Fluid,
-    protocol: FlowProtocol,
-    grid: IntegrationGrid,
-    adjoint: Any = None,
-) -> Inexact[Array, "n 3"]:
-    """Return what `AtSamples.observed` holds, at the samples of one grid.
-
-    `adjoint`: how diffrax differentiates in reverse mode. None is for values and forward mode: the
-    same steps, traced and compiled in a third of the time.
-    """
-    make = partial(dynamics_of_fluid, protocol=protocol)
-    if adjoint is None or protocol.control != "rate":
-        return observed_of_dynamics(make, fluid, fluid, protocol, grid)
-    start = begun(make(fluid), make(without_derivatives(fluid)), protocol, grid)
-    from discover.forward.by_diffrax import followed_in_reverse  # diffrax takes a second to load
-
-    modes = followed_in_reverse(dynamics_of_fluid, fluid, protocol, grid, start, adjoint)
-    return _of_states(fluid, jnp.swapaxes(modes, 1, 2), protocol, grid)
-
-
-def observed_of_dynamics(
+def samples_of_dynamics(
     make: Callable[[Numbers], Dynamics],
     numbers: Numbers,
     fluid: Fluid,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-) -> Inexact[Array, "n 3"]:
-    """Return what `observed_on_grid` does, of the modes that `make` makes of some numbers.
+) -> AtSamples:
+    """Return what `at_samples` does, of the modes that `make` makes of some numbers.
 
     `numbers`: a tree through which alone derivatives pass. `fluid`: of which these are the modes.
     """
     if protocol.control not in FOLLOWED:
-        return solved_on_grid(make, numbers, protocol, grid).observed
-
-    # the sum at every step, for all modes with many derivatives beside them are large
-    def observe(stress, rate):
-        return fluid.stress(stress.T, rate)
-
-    return _observed(_followed(make, numbers, protocol, grid, observe), protocol)
+        return solved_on_grid(make, numbers, protocol, grid)
+    fixed = make(without_derivatives(numbers))
+    states = follow(make(numbers), fixed, protocol, grid, lambda stress, _: stress.T)
+    rate = jax.vmap(protocol.rate)(grid.sample_times)
+    return AtSamples(_of_states(fluid, states, protocol, grid), states, rate)
 
 
-def _followed(make, numbers, protocol: FlowProtocol, grid: IntegrationGrid, observe: Observe):
-    return follow(make(numbers), make(without_derivatives(numbers)), protocol, grid, observe)
+def observed_in_reverse(
+    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, adjoint: Any
+) -> Inexact[Array, "n 3"]:
+    """Return what `AtSamples.observed` holds, at the samples of one grid.
+
+    `adjoint`: how diffrax differentiates in reverse mode, in flows at a given rate in time.
+    """
+    if protocol.control != "rate":
+        return at_samples(fluid, protocol, grid).observed
+    make = partial(dynamics_of_fluid, protocol=protocol)
+    start = begun(make(fluid), make(without_derivatives(fluid)), protocol, grid)
+    from discover.forward.by_diffrax import followed_in_reverse  # diffrax takes a second to load
+
+    modes = followed_in_reverse(dynamics_of_fluid, fluid, protocol, grid, start, adjoint)
+    return _of_states(fluid, jnp.swapaxes(modes, 1, 2), protocol, grid)
 
 
 def solved_on_grid(
@@ -148,12 +133,16 @@ def _at_given_stress(
 
 def _of_states(fluid, states: Float[Array, "n k s"], protocol: FlowProtocol, grid) -> Array:
     gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
-    return _observed(jax.vmap(fluid.stress)(states, gradient), protocol)
+    return observed_of_stress(jax.vmap(fluid.stress)(states, gradient), protocol)
 
 
-def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Array, "n 3"]:
-    s11, s22, s33, _ = stress.T
-    return jnp.stack([protocol.recorded_stress(stress.T), s11 - s22, s22 - s33], axis=-1)
+def observed_of_stress(
+    stress: Float[Array, "n 4 *c"], protocol: FlowProtocol
+) -> Float[Array, "n 3 *c"]:
+    """Return what is recorded of σ11, σ22, σ33, σ12 in Pa, N1 and N2."""
+    s11, s22, s33, s12 = jnp.moveaxis(stress, 1, 0)
+    recorded = protocol.recorded_stress(jnp.stack([s11, s22, s33, s12]))
+    return jnp.stack([recorded, s11 - s22, s22 - s33], axis=1)
 
 
 def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:

@@ -1,6 +1,7 @@
 """Programs of one structure of law and effects: rates and signal, and code that follows modes."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -9,8 +10,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from discover.effects import AbstractEffect, KinematicEffect, RadialAverage, Record, SignalEffect
-from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
+from discover.effects import KinematicEffect, RadialAverage, Record, SignalEffect
+from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers, Structure
 from discover.forward.flows import (
     Flows,
@@ -31,7 +32,7 @@ from discover.forward.side_by_side import (
     StressSideBySide,
     code_of,
 )
-from discover.laws import LAWS
+from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
 
 
@@ -54,9 +55,6 @@ class Program:
         self.averages = [e for e in structure.effects if isinstance(e, RadialAverage)]
         self._of_torque = [effect for effect in self._signal if not effect.of_force]
         self.of_force = [e for e in self._signal if e.of_force and e.acts_on_steady_states]
-        # a name does not tell one law from another that was registered under it in its place
-        build = LAWS[structure.law_name].build if structure.free_parameters else None
-        self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
@@ -84,116 +82,75 @@ class Program:
     def _in_lanes(
         self, numbers: Numbers, control: type, flow: Kinematics | None, choices: dict[str, bool]
     ):
-        given, made_from = (self.fluid, numbers, flow), self._made_from
+        given = self.fluid, numbers, flow
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
-            return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
+            return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own)
         if control is PeriodicFlows:
             code = code_of(PeriodicCode, *given)
-            own = self._periodic_rates, self._given_way, self._moduli_recorded
+            own = self._steady_rates, self._given_way, self._moduli_recorded
             in_cycles = partial(code_of, Kernel, *given, cycles=True)
-            return PeriodicSideBySide(self.fluid, code, in_cycles, *own, made_from)
+            return PeriodicSideBySide(self.fluid, code, in_cycles, *own)
         if control is StressFlows:
             code = code_of(StressCode, *given)
-            return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
+            return StressSideBySide(self.fluid, code, self._driven)
         kernel = code_of(Kernel, *given, **choices)
-        return SideBySide(self.fluid, kernel, self._rates, self._distorted, made_from)
+        return SideBySide(self.fluid, kernel, self._rates, self._distorted)
 
-    def _rates(self, theta, present, run):
-        """Return the felt rate at half steps and the tool's at steps, by the effects present.
+    # Rates and records of many vectors and runs, in arrays of NumPy with axes of these and of time;
+    # of `theta` parameters come first, and behind its vectors there are two axes of one
 
-        Here and in `_distorted` one vector and run, or in arrays of NumPy many: vectors and runs
-        are then the first axes of all that follows time, and the last of vectors.
-        """
-        instrument_times = run.times / run.clock_factor
+    def _rates(self, theta, present, run: TransientFlows):
+        """Return the felt rate at half steps and the tool's at steps, by the effects present."""
+        times, rate = run.times / run.clock_factor[:, None], run.commanded_rate
+        if run.steps is not None:
+            rate = run.steps.in_rate(rate, run.times, theta[self.fluid.instants])
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
         # commanded. So it does with a wrong gap: the angle is right, and the nominal rate of the
         # tool is the angle's over the nominal gap
-        flow = run.kinematics
-        rate = run.commanded_rate
-        if run.steps is not None:
-            rate = run.steps.in_rate(rate, run.times, theta[self.fluid.instants])
+        upstream = self._shaped(theta, present, run.kinematics, times, rate, self._upstream)
+        felt = self._shaped(theta, present, run.kinematics, times, upstream, self._downstream)
+        return felt, upstream[..., ::2]
 
-        def shaped(rate, effects):
-            for effect in effects:
-
-                def felt(rate, effect=effect):
-                    values = self.fluid.values(theta, effect)
-                    changed = effect.felt_rate(values, instrument_times, rate)
-                    return where_in_shear(flow, changed, rate)
-
-                rate = self._if_present(theta, present, effect, felt, rate)
-            return rate
-
-        upstream = shaped(rate, self._upstream)
-        return shaped(upstream, self._downstream), upstream[..., ::2]
-
-    def _if_present(self, theta, present, effect: AbstractEffect, change: Callable, value):
-        """Return what an effect makes of a value, which stays as it is without the effect."""
-        amplitude = theta[self.fluid.slices[effect.name].start]
-        is_present = present[self._number[effect.name]]
-        if isinstance(theta, np.ndarray):
-            return np.where(amplitude != 0.0, change(value), value) if is_present else value
-        return jax.lax.cond(
-            is_present,
-            lambda value: jnp.where(amplitude != 0.0, change(value), value),
-            lambda value: value,
-            value,
-        )
-
-    def _distorted(self, theta, present, run, stress, felt, tool_rate):
+    def _distorted(self, theta, present, run: TransientFlows, stress, felt, tool_rate):
         """Return the recorded stress at all steps, of that before the signal."""
-        times = run.times[..., ::2]
-        for effect in self._signal:
+        of_run = run.clock_factor[:, None], run.strain_before[:, None]
+        record = Record(run.times[..., ::2], felt, stress, *of_run, tool_rate)
+        return self._signalled(theta, present, run.kinematics, record, self._signal)
 
-            def distorted(stress, effect=effect):
-                strain = run.strain_before
-                record = Record(times, felt, stress, run.clock_factor, strain, tool_rate)
-                return self._as_recorded(theta, effect, record, run.kinematics)
-
-            stress = self._if_present(theta, present, effect, distorted, stress)
-        return stress
-
-    def _steady_rates(self, theta, present, run: SteadyFlows):
-        """Return the rates of a flow curve that the fluid feels where nothing slips."""
-        places, rate = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype), run.rate
-        for effect in (*self._upstream, *self._downstream):
-            if effect.acts_on_steady_states:
-
-                def felt(rate, effect=effect):
-                    changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
-                    return where_in_shear(run.kinematics, changed, rate)
-
-                rate = self._if_present(theta, present, effect, felt, rate)
-        return rate
+    def _steady_rates(self, theta, present, rate, flow: Kinematics | None):
+        """Return the rates of flow curves, or of oscillations, felt where nothing slips."""
+        effects = [e for e in (*self._upstream, *self._downstream) if e.acts_on_steady_states]
+        places = np.arange(float(rate.shape[-1]))[None]
+        return self._shaped(theta, present, flow, places, rate, effects)
 
     def _recorded_steady(self, theta, present, run: SteadyFlows, stress, felt):
-        """Return the recorded stress of a flow curve, of that before the signal."""
-        places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
-        rate = self._steady_rates(theta, present, run)
-        for effect in self._signal:
-            if effect.acts_on_steady_states:
+        """Return the recorded stress of flow curves, of that before the signal."""
+        rate = self._steady_rates(theta, present, run.rate, run.kinematics)
+        places = np.arange(float(run.rate.shape[1]))[None]
+        record = Record(places, felt, stress, np.ones((1, 1)), np.zeros((1, 1)), rate)
+        effects = [effect for effect in self._signal if effect.acts_on_steady_states]
+        return self._signalled(theta, present, run.kinematics, record, effects)
 
-                def distorted(stress, effect=effect):
-                    record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
-                    return self._as_recorded(theta, effect, record, run.kinematics)
+    def _shaped(self, theta, present, flow: Kinematics | None, times, rate, effects):
+        in_shear = True if flow is None else flow.is_shear[:, None]
+        for effect in effects:
+            if present[self._number[effect.name]]:
+                values = self.fluid.values(theta, effect)
+                changed = _felt(effect, values, times, rate)
+                rate = np.where((values[0] != 0.0) & in_shear, changed, rate)
+        return rate
 
-                stress = self._if_present(theta, present, effect, distorted, stress)
-        return stress
-
-    def _periodic_rates(self, theta, present, states: PeriodicFlows):
-        """Return the amplitudes of the rate that the fluid feels where nothing gives way."""
-        places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
-        rates = states.frequency * states.strain
-        for effect in (*self._upstream, *self._downstream):
-            if effect.acts_on_steady_states:
-
-                def felt(rates, effect=effect):
-                    return effect.felt_rate(self.fluid.values(theta, effect), places, rates)
-
-                rates = self._if_present(theta, present, effect, felt, rates)
-        return rates
+    def _signalled(self, theta, present, flow: Kinematics | None, record: Record, effects):
+        torque = np.ones((1, 1), bool) if flow is None else flow.records_torque[:, None]
+        for effect in effects:
+            if present[self._number[effect.name]]:
+                values = self.fluid.values(theta, effect)
+                is_its = (values[0] != 0.0) & (torque != effect.of_force)
+                changed = np.where(is_its, _recorded(effect, values, record), record.stress)
+                record = replace(record, stress=changed)
+        return record.stress
 
     def _recorded_modulus(self, theta, present, found, rate, nominal, frequency):
         """Return G′ and G″ as they are recorded, of those of the fluid at a rate that it feels."""
@@ -201,9 +158,11 @@ class Program:
         for effect in self._of_torque:
 
             def distorted(found, effect=effect):
-                return self._modulus_as_recorded(theta, effect, found, nominal, frequency)
+                changed = self._modulus_as_recorded(theta, effect, found, nominal, frequency)
+                return jnp.where(self.fluid.values(theta, effect)[0] != 0.0, changed, found)
 
-            found = self._if_present(theta, present, effect, distorted, found)
+            is_present = present[self._number[effect.name]]
+            found = jax.lax.cond(is_present, distorted, lambda found: found, found)
         return jnp.stack([found.real, found.imag])
 
     def _whole(self, numbers, theta, strain, frequency, of_modes):
@@ -211,7 +170,7 @@ class Program:
         rate = strain * frequency * jnp.cos(PHASE)
         beside = self.fluid.beside(numbers, theta, rate, None)
         whole = of_modes + first_harmonic(beside, PHASE) / strain
-        series = self.fluid.in_series(theta, None)
+        series = self.fluid.in_series(theta)
         if series is None:
             return whole, jnp.ones((), dtype=complex)
         return whole, 1.0 + (series.compliance + series.slip / (1j * frequency)) * whole
@@ -224,9 +183,10 @@ class Program:
 
         return jax.vmap(one)(strain, states.frequency, of_modes)
 
-    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, strain, of_modes):
+    def _moduli_recorded(
+        self, numbers, theta, present, states: PeriodicFlows, strain, of_modes, rates
+    ):
         """Return both moduli of states as they are recorded, of those of the modes."""
-        rates = self._periodic_rates(theta, present, states)
         commanded = states.frequency * states.strain
 
         def one(rate, nominal, frequency, strain, found):
@@ -256,40 +216,60 @@ class Program:
         )
         return first_harmonic(0.5 * (there - back), phase) / strain
 
-    def _driven(self, theta, run: StressFlows):
-        """Return the true stress of a run at a given one in Pa, and the tool's inertia in Pa s²."""
-        flow, imposed, inertia = run.kinematics, run.imposed, jnp.zeros(())
-        still = jnp.zeros_like(imposed)
+    def _driven(self, theta, present, run: StressFlows):
+        """Return the true stress of runs at a given one in Pa, and the tool's inertia in Pa s².
+
+        And the strain at step ends of what gives way in series.
+        """
+        imposed, clock, flow = run.imposed, run.clock_factor[:, None], run.kinematics
+        still, none = np.zeros_like(imposed), np.zeros((1, 1))
+        inertia = strain = none
         for effect in reversed(self._of_torque):
+            if not present[self._number[effect.name]]:
+                continue
             values = self.fluid.values(theta, effect)
-            inertia = inertia + effect.inertia(values) * run.clock_factor**2
+            inertia = inertia + np.asarray(effect.inertia(values)) * clock**2
             if effect.acts_on_steady_states:
                 # the true stress of a recorded one: these effects are linear in it
                 nothing, unit = (
-                    effect.recorded_stress(
-                        values, Record(run.times, still, still + size, run.clock_factor)
-                    )
+                    _recorded(effect, values, Record(run.times, still, still + size, clock, none))
                     for size in (0.0, 1.0)
                 )
                 imposed = (imposed - nothing) / (unit - nothing)
-        inertia = where_in_shear(flow, inertia, jnp.zeros(()))
-        return where_in_shear(flow, imposed, run.imposed), inertia
-
-    def _driven_with_series(self, theta, run: StressFlows):
-        """Return these, and the strain at step ends of what gives way in series."""
-        imposed, inertia = self._driven(theta, run)
-        series = self.fluid.in_series(theta, run.kinematics)
-        strain = jnp.zeros_like(imposed)
+        series = self.fluid.in_series(theta)
         if series is not None:
             strain = series.strain(run.times, imposed)
-        return imposed, inertia, strain
+        in_shear = True if flow is None else flow.is_shear[:, None]
+        pairs = (imposed, run.imposed), (inertia, 0.0), (strain, 0.0)
+        return [np.where(in_shear, changed, unchanged) for changed, unchanged in pairs]
 
-    def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
-        """Return the stress after an effect on the signal of torque or force, where it is that."""
-        changed = effect.recorded_stress(self.fluid.values(theta, effect), record)
-        if flow is None:
-            return record.stress if effect.of_force else changed
-        return jnp.where(flow.records_torque != effect.of_force, changed, record.stress)
+
+def _felt(effect: KinematicEffect, values, times, rate):
+    """Return `felt_rate` of many vectors and runs, one after another if it takes no NumPy."""
+    if effect.takes_numpy:
+        return effect.felt_rate(values, times, rate)
+    each = _one_by_one(effect.felt_rate, "(p),(n),(n)->(n)")
+    return np.asarray(each(np.moveaxis(values[..., 0], 0, -1), times, rate))
+
+
+def _recorded(effect: SignalEffect, values, record: Record):
+    """Return `recorded_stress` of many vectors and runs, likewise."""
+    if effect.takes_numpy:
+        return effect.recorded_stress(values, record)
+    each = _one_by_one(effect.recorded_stress, "(p),(n),(n),(n),(1),(1),(n)->(n)")
+    return np.asarray(each(np.moveaxis(values[..., 0], 0, -1), *vars(record).values()))
+
+
+@lru_cache(maxsize=32)
+def _one_by_one(function: Callable, signature: str) -> Callable:
+    def one(values, *arrays):
+        if len(arrays) == 2:
+            return function(values, *arrays)
+        times, rate, stress, clock_factor, strain_before, tool_rate = arrays
+        of_run = clock_factor[0], strain_before[0]
+        return function(values, Record(times, rate, stress, *of_run, tool_rate))
+
+    return compiled(jnp.vectorize(one, signature=signature))
 
 
 program_of = lru_cache(maxsize=16)(Program)

@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from discover.dataset import Run
 
@@ -21,42 +19,46 @@ class RateSteps(eqx.Module):
     not fitted.
     """
 
-    start: Float[Array | np.ndarray, "*runs steps"]
-    end: Float[Array | np.ndarray, "*runs steps"]
-    change: Float[Array | np.ndarray, "*runs steps"]  # of the rate in 1/s
-    share: Float[Array | np.ndarray, "*runs steps"]
-    place: Int[Array | np.ndarray, "*runs steps"]
+    start: Float[np.ndarray, "*runs steps"]
+    end: Float[np.ndarray, "*runs steps"]
+    change: Float[np.ndarray, "*runs steps"]  # of the rate in 1/s
+    share: Float[np.ndarray, "*runs steps"]
+    place: Int[np.ndarray, "*runs steps"]
 
     def in_rate(
-        self, rate: Float[Array, " m"], times: Float[Array, " m"], fitted: Float[Array, " fitted"]
-    ) -> Float[Array, " m"]:
-        """Return the rate of one run with its steps where they happen.
+        self,
+        rate: Float[np.ndarray, "runs m"],
+        times: Float[np.ndarray, "runs m"],
+        fitted: Float[np.ndarray, "fitted vectors 1 1"],
+    ) -> Float[np.ndarray, "vectors runs m"]:
+        """Return the rate of runs with its steps where they happen.
 
         Between the two samples Simpson's rule gives the strain of each step of the integration, so
         that rates change smoothly with the instant. `rate`, `times`: at ends and middles of steps
         in turn, in 1/s and s, with a straight line where the rate steps. `fitted`: the fitted
         shares.
         """
-        share = self.share
-        if fitted.shape[0]:
-            share = jnp.where(self.place < 0, share, fitted[self.place])
-        instant = self.start + share * (self.end - self.start)
-        ends = times[::2]
-        first, last = ends[:-1], ends[1:]
+        share = np.broadcast_to(self.share, (fitted.shape[1], *self.share.shape))
+        if len(fitted):
+            share = np.where(self.place < 0, share, np.moveaxis(fitted[self.place, :, 0, 0], -1, 0))
+        ends = times[:, ::2]
+        first, last = ends[:, :-1], ends[:, 1:]
         # of the two steps that meet at an end; beyond those of the record there is none
-        reach = jnp.concatenate([jnp.ones(1), ends[2:] - ends[:-2], jnp.ones(1)])
-
-        def added(start, end, change, instant):
-            at_ends = jnp.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
-            at_ends = jnp.where(ends <= start, 0.0, jnp.where(ends >= end, 1.0, at_ends))
-            strain = jnp.clip((last - instant) / (last - first), 0.0, 1.0)
-            in_middle = 1.5 * strain - 0.25 * (at_ends[:-1] + at_ends[1:])
-            stepped = jnp.zeros_like(times).at[::2].set(at_ends).at[1::2].set(in_middle)
-            straight = jnp.clip((times - start) / (end - start), 0.0, 1.0)
+        reach = np.pad(ends[:, 2:] - ends[:, :-2], ((0, 0), (1, 1)), constant_values=1.0)
+        total = np.broadcast_to(rate, (len(share), *rate.shape)).copy()
+        for k in range(self.start.shape[1]):
+            start, end, change = (of[:, k, None] for of in (self.start, self.end, self.change))
+            instant = start + share[:, :, k, None] * (end - start)
+            at_ends = np.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
+            at_ends = np.where(ends <= start, 0.0, np.where(ends >= end, 1.0, at_ends))
+            strain = np.clip((last - instant) / (last - first), 0.0, 1.0)
+            stepped = np.zeros_like(total)
+            stepped[..., ::2] = at_ends
+            stepped[..., 1::2] = 1.5 * strain - 0.25 * (at_ends[..., :-1] + at_ends[..., 1:])
+            straight = np.clip((times - start) / (end - start), 0.0, 1.0)
             between = (times > start) & (times < end)
-            return change * jnp.where(between, stepped - straight, 0.0)
-
-        return rate + jnp.sum(jax.vmap(added)(self.start, self.end, self.change, instant), axis=0)
+            total += change * np.where(between, stepped - straight, 0.0)
+        return total
 
     def padded(self, count: int) -> "RateSteps":
         """Return as many steps of each run as asked for; those beyond its own never happen."""

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any, Literal
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 from jaxtyping import Array, Bool, Float
@@ -18,8 +19,14 @@ from jaxtyping import Array, Bool, Float
 from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics, with_cheap_tangents
+from discover.forward.fluids import (
+    dynamics_of_fluid,
+    observed_of_stress,
+    samples_of_dynamics,
+    with_cheap_tangents,
+)
 from discover.forward.of_fluids import pieces_in_time
+from discover.forward.stepping import follow
 from discover.identify.exact_series import same_shear_stress
 from discover.identify.relations import (
     Direction,
@@ -38,6 +45,7 @@ from discover.programs import compiled
 from discover.summary_view import NotebookView, table_of
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
+from tensor_library.algebra import contracted, rate_of_deformation
 
 
 @partial(compiled, runs_long=True)
@@ -45,26 +53,51 @@ def with_sensitivities(
     law: LibraryExpansion, known: Fluid, flows: FlowBatch
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
     """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients."""
+    fluid = replace(known, law=law)
 
     def stress_rate(made, coefficients, *flow):
         return replace(made, coefficients=coefficients).stress_rate(*flow)
 
-    def one(coefficients, protocol, grid):
+    def at_given_rate(protocol, grid):
+        """Follow σ with its derivatives beside it, which is traced sooner than through a step."""
+
+        def of_mode(made, state, gradient):
+            def change(stress, coefficients):
+                return stress_rate(made, coefficients, stress, gradient)
+
+            value, pull = jax.vjp(change, state[:, 0], law.coefficients)
+            by_state, by_coefficient = jax.vmap(pull)(jnp.eye(len(state)))
+            beside = by_state @ state[:, 1:] + by_coefficient
+            return jnp.concatenate([value[:, None], beside], axis=1)
+
+        def observe(state, gradient):
+            stress = contracted(state[:4], known.modulus)
+            return stress.at[:, 0].add(known.solvent_viscosity * rate_of_deformation(gradient))
+
+        alone = dynamics_of_fluid(fluid, protocol)
+        of_modes = jax.jit(over_modes(of_mode, law, -1))  # traced once for all stages of a step
+        beside = alone._replace(slope=of_modes, columns=len(law.coefficients))
+        found = observed_of_stress(follow(beside, alone, protocol, grid, observe), protocol)
+        return found[..., 0], found[..., 1:]
+
+    def one(protocol, grid):
+        if protocol.control == "rate":
+            return at_given_rate(protocol, grid)
+
         def dynamics(coefficients):
             def of_mode(made, *flow):
                 return with_cheap_tangents(stress_rate, made)(coefficients, *flow)
 
-            fluid = replace(known, law=law)
             return dynamics_of_fluid(fluid, protocol)._replace(slope=over_modes(of_mode, law, -1))
 
-        return observed_of_dynamics(dynamics, coefficients, known, protocol, grid)
+        def observed(coefficients):
+            found = samples_of_dynamics(dynamics, coefficients, known, protocol, grid).observed
+            return found, found
 
-    def observed(coefficients):
-        found = flows.over(partial(one, coefficients))
-        return found, found
+        columns, value = jax.jacfwd(observed, has_aux=True)(law.coefficients)
+        return value, columns
 
-    columns, value = jax.jacfwd(observed, has_aux=True)(law.coefficients)
-    return value, columns
+    return flows.over(one)
 
 
 Verdict = Literal["measured", "determined", "assumed", "undetermined"]

@@ -93,12 +93,12 @@ class Kinematics(eqx.Module):
         return contracted(self.recorded, components)
 
     @property
-    def is_shear(self) -> Bool[Array, "*batch"]:
+    def is_shear(self) -> Bool[Array | np.ndarray, "*batch"]:
         """Whether it is simple shear, made by a rotational rheometer."""
         return self.gradient[..., 3] == 1.0
 
     @property
-    def records_torque(self) -> Bool[Array, "*batch"]:
+    def records_torque(self) -> Bool[Array | np.ndarray, "*batch"]:
         """Whether the torque is what is recorded: σ12 in shear."""
         return self.recorded[..., 3] == 1.0
 

@@ -47,8 +47,9 @@ class ContinuousFluid:
         self.rest = np.concatenate([np.zeros(4 * len(modes)), *rest])
         one = jnp.ones(1)
         self.viscosity = float(self._fluid.beside(self._numbers, self._theta, one, self._flow)[0])
-        series = self._fluid.in_series(self._theta, self._flow)
-        self.slip, self.compliance = (0.0, 0.0) if series is None else map(float, series)
+        series = self._fluid.in_series(self._theta)
+        gives_way = series is not None and (self._flow is None or bool(self._flow.is_shear))
+        self.slip, self.compliance = map(float, series) if gives_way else (0.0, 0.0)
 
     def stress(self, y):
         """Return the recorded stress of the modes in Pa."""

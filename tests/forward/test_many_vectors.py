@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from compilations import compilations
 from in_continuous_time import ContinuousFluid
 from vectors import vector_of
 
@@ -15,7 +16,6 @@ from discover.effects.library_term import library_effects
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
 from discover.forward.side_by_side import code
-from discover.programs.program_cache import Compiled
 from discover.protocols import oscillatory_shear, start_up
 from discover.protocols.protocol import in_flow
 
@@ -127,11 +127,9 @@ def test_an_effect_that_lanes_do_not_know_is_predicted_all_the_same():
 
 def counted(monkeypatch):
     """Return lists to which kernels and programs that are made from here on are added."""
-    kernels, programs = [], []
-    loaded, made = code.callable_of, Compiled._made
+    kernels, loaded = [], code.callable_of
     monkeypatch.setattr(code, "callable_of", lambda *of: kernels.append(1) or loaded(*of))
-    monkeypatch.setattr(Compiled, "_made", lambda self, *of: programs.append(1) or made(self, *of))
-    return kernels, programs
+    return kernels, compilations()
 
 
 @pytest.mark.usefixtures("code_of_every_effect")

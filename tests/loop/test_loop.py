@@ -8,6 +8,7 @@ import fewer_hypotheses
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from compilations import compilations
 from independent.noise import white
 
 from discover.dataset import Dataset, Run, load_dataset, relaxation_spectrum
@@ -15,7 +16,6 @@ from discover.errors import InputError
 from discover.forward.side_by_side import code
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.loop import DeclaredModel, run_loop
-from discover.programs.program_cache import Compiled
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
 
@@ -88,13 +88,11 @@ def test_a_second_loop_of_other_effects_on_other_runs_compiles_nothing(
     planted_mobility, monkeypatch
 ):
     assert planted_mobility.stages
-    kernels, programs = [], []
-    loaded, made = code.callable_of, Compiled._made
+    kernels, programs, loaded = [], compilations(), code.callable_of
     monkeypatch.setattr(code, "callable_of", lambda *of: kernels.append(1) or loaded(*of))
-    monkeypatch.setattr(Compiled, "_made", lambda self, *of: programs.append(1) or made(self, *of))
     result = loop(make_dataset(Giesekus(0.3), seed=3), effects=OTHERS, held_out=["slow"])
     assert result.stages
-    assert (len(kernels), len(programs)) == (0, 0)
+    assert (kernels, programs) == ([], [])
 
 
 def test_a_planted_mobility_is_found_named_and_predicts_the_held_out_run(planted_mobility):

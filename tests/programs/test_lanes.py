@@ -11,8 +11,6 @@ from discover.programs.lanes import (
     Translation,
     Writing,
     callable_of,
-    kept,
-    machine_code,
 )
 
 SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e-320, -1.0, 800.0])
@@ -120,27 +118,3 @@ def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
     matrices = np.moveaxis(entries.reshape(3, 3, LANES), -1, 0)
     exact = np.linalg.solve(matrices, right.T[:, :, None])[:, :, 0].T
     np.testing.assert_allclose(found, exact, rtol=1e-11)
-
-
-def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(machine_code, "program_folder", lambda: tmp_path)
-    made = []
-
-    def written(value=b"machine code", stands_alone=True):
-        made.append(value)
-        return value, stands_alone
-
-    assert kept(("this test", 1), written) == kept(("this test", 1), written) == b"machine code"
-    assert len(made) == 1
-    (file,) = tmp_path.iterdir()
-    file.write_bytes(file.read_bytes()[:-1] + b"!")
-    assert kept(("this test", 1), written) == b"machine code"
-    assert len(made) == 2
-    for _ in range(2):  # what a function of this module does may change, and no version tells
-        kept(("this test", in_lanes), written)
-    assert len(made) == 4
-    for _ in range(2):  # nor is what calls functions of this process there at the next start
-        kept(("this test", 2), lambda: written(stands_alone=False))
-    assert len(made) == 6

@@ -3,9 +3,9 @@
 import jax.numpy as jnp
 import pytest
 
-from discover.programs import compiled, program_cache
+from discover.programs import compiled, compiler
 
-PIECES = program_cache._PIECES
+PIECES = compiler._PIECES
 pytestmark = pytest.mark.skipif(not PIECES.is_file(), reason="only Linux limits the pieces")
 
 
@@ -24,8 +24,8 @@ def make_programs(n):
 @pytest.fixture
 def limit(tmp_path, monkeypatch):
     file = tmp_path / "max_map_count"
-    monkeypatch.setattr(program_cache, "_LIMIT", file)
-    monkeypatch.setattr("discover.programs.program_cache._LOOK_EVERY", 10)
+    monkeypatch.setattr(compiler, "_LIMIT", file)
+    monkeypatch.setattr(compiler, "_LOOK_EVERY", 10)
     return file
 
 
@@ -44,7 +44,7 @@ def test_programs_make_room_for_others_and_answers_stay(limit):
 
 def test_a_process_with_room_keeps_its_programs(limit):
     limit.write_text(str(10**9))
-    assert not program_cache.is_crowded()
+    assert not compiler._is_crowded()
     make_programs(30)
     held = pieces()
     make_programs(5)  # of a function made anew, so programs of its own
@@ -54,6 +54,6 @@ def test_a_process_with_room_keeps_its_programs(limit):
 @pytest.mark.parametrize("text", ["", "many"])
 def test_a_limit_that_cannot_be_read_is_none(limit, text):
     limit.write_text(text)
-    assert not program_cache.is_crowded()
+    assert not compiler._is_crowded()
     limit.unlink()
-    assert not program_cache.is_crowded()
+    assert not compiler._is_crowded()

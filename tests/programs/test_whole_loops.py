@@ -7,7 +7,7 @@ import sys
 import jax
 import pytest
 
-from discover.programs.program_cache import _compiled_soon, _whole_loops
+from discover.programs.compiler import _compiled_soon, _whole_loops
 
 LOOP = """
 import discover.compilation_cache

@@ -11,7 +11,7 @@ from independent.sweeps import modulus_of, strain_at
 
 from discover.errors import InputError
 from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import dynamics_of_fluid, observed_on_grid, solved_on_grid
+from discover.forward.fluids import at_samples, dynamics_of_fluid, solved_on_grid
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.classical import Giesekus
 from discover.protocols import imposed_stress, oscillations, oscillatory_shear, steady_rates
@@ -42,7 +42,9 @@ def test_an_amplitude_sweep_is_where_scipy_ends():
     flows = lay_out(
         [recording(SWEEP, f"{name}_modulus") for name in ("loss", "storage")], [COUNTED] * 2
     )
-    loss, storage = jax.jit(lambda law: flows.over(partial(observed_on_grid, law)))(fluid())[..., 0]
+    loss, storage = jax.jit(lambda law: flows.over(partial(at_samples, law)).observed)(fluid())[
+        ..., 0
+    ]
     exact = np.array([modulus_of(LAW, strain, FREQUENCY, 12) for strain in STRAINS])
     exact = exact + 1j * SOLVENT * FREQUENCY
     # steps of a strain of 0.4: 5e-6 was measured
@@ -88,7 +90,7 @@ def test_derivatives_forward_and_in_reverse_are_differences(protocol, times):
     flows = lay_out([protocol], [times])
 
     def recorded(mobility):
-        return flows.over(partial(observed_on_grid, fluid(mobility)))[0, :, 0]
+        return flows.over(partial(at_samples, fluid(mobility))).observed[0, :, 0]
 
     @jax.jit
     def moved(mobility):

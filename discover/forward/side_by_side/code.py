@@ -123,11 +123,10 @@ class Code:
         relaxations = found[0].relaxations
         self._kinds = 1 if relaxations is None else 2 * relaxations.shape[1]
 
-    def packing(self, fluid: AugmentedFluid, made_from: tuple) -> Callable[..., Packed]:
+    def packing(self, fluid: AugmentedFluid) -> Callable[..., Packed]:
         """Return what packs numbers, vectors and their moduli, however many.
 
-        The solvent's viscosity stands behind the moduli. `made_from`: what tells the fluid from
-        that of another structure.
+        The solvent's viscosity stands behind the moduli.
         """
 
         def packed(numbers: Numbers, thetas, moduli):
@@ -138,7 +137,7 @@ class Code:
 
             return jax.vmap(one)(thetas, moduli[:, :-1], moduli[:, -1])
 
-        program = compiled(packed, made_from=("packed", *made_from))
+        program = compiled(packed)
 
         def all_packed(numbers: Numbers, thetas: np.ndarray, moduli: np.ndarray) -> Packed:
             count = len(thetas)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.pieces import FEWEST, STEADY
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.code import as_array as _array
 from discover.forward.side_by_side.cycles import Cycles
@@ -29,6 +28,11 @@ _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 # that is carried from step to step
 _TAKEN, _SUM, _OTHER_SUM, _BEGIN, _MOVED, _STATE = range(6)
 _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
+
+# Pieces of a step from which on it may end early, once a state is steady at a rate that is felt as
+# constant, and by how much it may then still change until the end: nothing that is seen, as a
+# steady state comes nearer with every piece
+FEWEST, STEADY = 8, 1e-9
 
 # A stress over its modulus, and a state of the fluid, of which changes are no longer relative
 _SMALL, _SMALL_STATE = 1e-3, 1e-2

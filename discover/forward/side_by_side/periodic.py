@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +20,7 @@ from discover.forward.side_by_side.predictors import (
     Asked,
     StatePredictor,
     flows_of,
+    in_whole_eights,
 )
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.steady_states import goes_on, next_approximation, relative_change
@@ -204,8 +206,9 @@ class PeriodicSideBySide(StatePredictor):
     """Predictions of moduli for one structure of law and effects.
 
     `cycles`: makes the code of transients that begin with a cycle, for vectors whose states change
-    in it. `rates`, `given_way`, `recorded`: the felt rate; of a vector, states, felt strains and
-    moduli of the modes, by how much the tool turns further than the fluid; and what is recorded.
+    in it. `rates`: as of `StatePredictor`. `given_way`, `recorded`: of a vector, states, felt
+    strains and moduli of the modes: by how much the tool turns further than the fluid; and with the
+    felt rates, what is recorded.
     """
 
     def __init__(
@@ -216,11 +219,10 @@ class PeriodicSideBySide(StatePredictor):
         rates: Callable,
         given_way: Callable,
         recorded: Callable,
-        made_from: tuple,
     ):
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
         shaping = [e for e in acting if isinstance(e, KinematicEffect)]
-        super().__init__(fluid, code, made_from, shaping, rates, (0, None, None))
+        super().__init__(fluid, code, shaping, rates)
         self._cycles = cycles
         self._states = self._amplitudes(e for e in fluid.states if e.acts_on_steady_states)
         self._series = self._amplitudes(fluid.series)
@@ -233,27 +235,27 @@ class PeriodicSideBySide(StatePredictor):
 
             return of
 
-        self._given_way = self._program(
-            "given way", of_solvent(given_way), (None, 0, 0, None, 0, 0)
-        )
-        self._recorded = self._program(
-            "moduli", of_solvent(recorded), (None, 0, 0, None, None, 0, 0)
-        )
+        self._given_way = self._program(of_solvent(given_way), (None, 0, 0, None, 0, 0))
+        self._recorded = self._program(of_solvent(recorded), (None, 0, 0, None, None, 0, 0, 0))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials states 2"]:
         """Return both moduli."""
-        part, eights, count = asked.part, self._eights(asked), len(asked.thetas)
-        frequency = np.asarray(part.frequency)
-        rate = self._felt(asked, eights, frequency * np.asarray(part.strain))[:count]
-        strain, of_modes = self._answered(asked, rate / frequency)
+        part = asked.part
+        rate = self._felt(asked, (part.frequency * part.strain)[None])[:, 0]
+        strain, of_modes = self._answered(asked, rate / part.frequency)
         present = self._fluid.present(asked.thetas)
-        found = [
-            self._recorded(
-                asked.numbers, own[:, -1], eight, present, part, strain[at], of_modes[at]
-            )
-            for (eight, own), at in zip(eights.pairs, eights.places, strict=True)
-        ]
-        return np.concatenate(found)[:count]
+        return self._of_eights(
+            asked, lambda own, at: self._recorded(
+                asked.numbers, own.moduli[:, -1], own.thetas, present, part, strain[at],
+                of_modes[at], rate[at],
+            ),
+        )  # fmt: skip
+
+    def _of_eights(self, asked: Asked, of: Callable[[Asked, np.ndarray], Any]) -> np.ndarray:
+        """Return what is found of eight vectors at a time, and where these stand."""
+        count = len(asked.thetas)
+        each = in_whole_eights(count).reshape(-1, LANES)
+        return np.concatenate([of(asked.taken(at), at) for at in each])[:count]
 
     def _answered(self, asked: Asked, strain: Float[np.ndarray, "trials states"]):
         """Return the strain that the fluid feels of the tool's, and the moduli of its modes.
@@ -268,14 +270,15 @@ class PeriodicSideBySide(StatePredictor):
             if not len(trials):
                 break
             own = asked.taken(trials)
-            now, eights = felt[trials], self._eights(own)
-            taken = np.concatenate(
-                [
-                    self._given_way(own.numbers, moduli[:, -1], eight, own.part, now[at],
-                                    of_modes[trials][at])
-                    for (eight, moduli), at in zip(eights.pairs, eights.places, strict=True)
-                ]
-            )[: len(trials)]  # fmt: skip
+            now, found = felt[trials], of_modes[trials]
+
+            def further(eight: Asked, at: np.ndarray, now=now, found=found):
+                solvent = eight.moduli[:, -1]
+                return self._given_way(
+                    eight.numbers, solvent, eight.thetas, eight.part, now[at], found[at]
+                )
+
+            taken = self._of_eights(own, further)
             lacking = np.log(strain[trials] / now) - np.log(np.abs(taken))
             passed = np.log(now / before[trials])
             moved = passed != 0.0
@@ -302,8 +305,8 @@ class PeriodicSideBySide(StatePredictor):
 
     def _in_cycles(self, asked: Asked, strain: Float[np.ndarray, "trials states"]) -> np.ndarray:
         """Return the moduli of modes that states of the fluid couple, each state a run."""
-        part, steps = asked.part, 2 * np.asarray(asked.part.steps).astype(np.int64)
-        frequency, most = np.asarray(part.frequency), int(np.max(steps))
+        part, steps = asked.part, 2 * asked.part.steps.astype(np.int64)
+        frequency, most = part.frequency, int(np.max(steps))
         thetas = asked.thetas.copy()
         thetas[:, self._still] = 0.0
         width = np.repeat((2.0 * np.pi / (frequency * steps))[:, None], most, axis=1)
@@ -316,7 +319,7 @@ class PeriodicSideBySide(StatePredictor):
 
         def eight(lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
             amplitude = strain[lanes].T
-            given = packed.of_eight(lanes, len(asked.numbers.modulus)) | {
+            given = packed.of_eight(lanes, asked.declared) | {
                 "rate": wave[:, :, None] * amplitude[:, None], "table": np.zeros(WEIGHTS),
                 "last": steps, "pieces": np.ones(width.shape, np.int64),
                 "cycle": np.stack([np.zeros_like(steps), steps], axis=1),
@@ -331,14 +334,14 @@ class PeriodicSideBySide(StatePredictor):
 
     def _of_each_mode(self, asked: Asked, strain: Float[np.ndarray, "trials states"]) -> np.ndarray:
         """Return the moduli of modes each of which is solved for by itself."""
-        part, declared, eights = asked.part, len(asked.numbers.modulus), self._eights(asked)
-        frequency, steps = np.asarray(part.frequency), np.asarray(part.steps).astype(np.int64)
+        part, packed = asked.part, self._packed(*asked[:3])
+        frequency, steps = part.frequency, part.steps.astype(np.int64)
         out = np.empty((len(asked.thetas), len(frequency)), complex)
 
         def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             own = steps[state[::LANES]]
             half = np.arange(2 * own.max() + 1) * (0.5 * np.pi / own[:, None])
-            given = eights.packed.of_lanes(trial, declared) | {
+            given = packed.of_lanes(trial, asked.declared) | {
                 "strain": lanes_last(strain[trial, state]),
                 "frequency": lanes_last(frequency[state]),
                 "steps": own, "cosine": np.cos(half), "sine": np.sin(half),

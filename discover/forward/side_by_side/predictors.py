@@ -55,6 +55,11 @@ def flows_of(kinematics: Any) -> Float[np.ndarray, "runs numbers"]:
     return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
 
+def per_run(thetas: Float[np.ndarray, "trials p"]) -> Float[np.ndarray, "p trials 1 1"]:
+    """Return parameters of vectors before axes of runs and of time."""
+    return thetas.T[..., None, None]
+
+
 class MadeOnce:
     """What is made of something, as parts of a batch, once for each of the `kept` last."""
 
@@ -73,28 +78,21 @@ class MadeOnce:
 
 
 class LanePredictor:
-    """Predictions of one kind of flows for one structure of law and effects, in lanes.
+    """Predictions of one kind of flows for one structure of law and effects, in lanes."""
 
-    `made_from`: what tells the structure from another.
-    """
-
-    def __init__(self, fluid: AugmentedFluid, code: Any, made_from: tuple):
+    def __init__(self, fluid: AugmentedFluid, code: Any):
         self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
-        self._made_from = made_from
-        self._packed: Callable[..., Packed] = code.packing(fluid, made_from)
+        self._packed: Callable[..., Packed] = code.packing(fluid)
 
     def _amplitudes(self, effects: Iterable[AbstractEffect]) -> list[int]:
         return [self._fluid.slices[effect.name].start for effect in effects]
 
-    def _program(
-        self, name: str, function: Callable, *axes: Sequence[int | None], vectors_to: Any = 0
-    ) -> Callable:
+    def _program(self, function: Callable, *axes: Sequence[int | None]) -> Callable:
         """Return a program of a function mapped over axes, that of the vectors last."""
         *inner, outermost = axes
         for along in inner:
             function = jax.vmap(function, along)
-        function = jax.vmap(function, outermost, vectors_to)
-        return compiled(function, (name, *self._made_from))
+        return compiled(jax.vmap(function, outermost))
 
     def _by_eights(
         self,
@@ -122,54 +120,26 @@ class LanePredictor:
         return out
 
 
-class Eights(NamedTuple):
-    """Vectors in whole eights, the last again until they are full.
-
-    `pairs`, `places`: of each eight its vectors and moduli, and where these stand among the
-    vectors.
-    """
-
-    pairs: list[tuple[np.ndarray, np.ndarray]]
-    places: list[np.ndarray]
-    packed: Packed
-
-
 class StatePredictor(LanePredictor):
     """Predictions of states, steady or periodic, each of which is a lane of its own.
 
-    `shaping`: effects that shape the rate. `rates`: the felt rate, of a vector, the effects present
-    and runs, mapped over `axes`.
+    `shaping`: effects that shape the rate. `rates`: the felt rates, of vectors as `per_run` has
+    them, the effects present, the commanded rates of runs and their flow.
     """
 
     def __init__(
-        self,
-        fluid: AugmentedFluid,
-        code: Code,
-        made_from: tuple,
-        shaping: Iterable[AbstractEffect],
-        rates: Callable,
-        *axes: Sequence[int | None],
+        self, fluid: AugmentedFluid, code: Code, shaping: Iterable[AbstractEffect], rates: Callable
     ):
-        super().__init__(fluid, code, made_from)
-        self._shaping = self._amplitudes(shaping)
-        self._rates = self._program(f"rates of {type(code).__name__}", rates, *axes)
+        super().__init__(fluid, code)
+        self._shaping, self._rates = self._amplitudes(shaping), rates
 
-    def _eights(self, asked: Asked) -> Eights:
-        places = in_whole_eights(len(asked.thetas))
-        each = [
-            values[places].reshape(-1, LANES, values.shape[1])
-            for values in (asked.thetas, asked.moduli)
-        ]
-        pairs = list(zip(*each, strict=True))
-        packed = self._packed(asked.numbers, asked.thetas, asked.moduli)
-        return Eights(pairs, np.split(places, len(pairs)), packed)
-
-    def _felt(self, asked: Asked, eights: Eights, commanded: np.ndarray) -> np.ndarray:
+    def _felt(self, asked: Asked, commanded: np.ndarray, flow: Any = None) -> np.ndarray:
         """Return the rates that each vector feels: as commanded, or as effects shape them."""
-        if not np.any(asked.thetas[:, self._shaping]):
-            return np.broadcast_to(commanded, (LANES * len(eights.pairs), *commanded.shape))
-        present = self._fluid.present(asked.thetas)
-        return np.concatenate([self._rates(own, present, asked.part) for own, _ in eights.pairs])
+        found = commanded
+        if np.any(asked.thetas[:, self._shaping]):
+            present = self._fluid.present(asked.thetas)
+            found = self._rates(per_run(asked.thetas), present, commanded, flow)
+        return np.broadcast_to(found, (len(asked.thetas), *commanded.shape))
 
     def _by_states(
         self,

@@ -3,18 +3,20 @@
 from collections.abc import Callable
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
+from discover.forward.flows import SteadyFlows
 from discover.forward.side_by_side.code import Code, lanes_last
 from discover.forward.side_by_side.predictors import (
     Asked,
-    Eights,
     StatePredictor,
     flows_of,
+    per_run,
 )
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.forward.steady_states import (
@@ -217,7 +219,7 @@ _AT_ONCE = 8
 class SteadySideBySide(StatePredictor):
     """Predictions of flow curves for one structure of law and effects.
 
-    `recorded`: of a vector, the effects present, a run, its stress and felt rate: what is recorded.
+    `recorded`: of vectors, the effects present, runs, their stress and felt rate: what is recorded.
     """
 
     def __init__(
@@ -226,36 +228,27 @@ class SteadySideBySide(StatePredictor):
         code: SteadyCode,
         rates: Callable,
         recorded: Callable,
-        made_from: tuple,
     ):
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
         shaping = [e for e in acting if isinstance(e, KinematicEffect)]
-        axes = (None, None, 0), (0, None, None)
-        super().__init__(fluid, code, made_from, shaping, rates, *axes)
+        super().__init__(fluid, code, shaping, rates)
         self._distorting = self._amplitudes(e for e in acting if isinstance(e, SignalEffect))
-        axes = (None, None, 0, 0, 0), (0, None, None, 0, 0)
-        self._recorded = self._program("steady records", recorded, *axes)
+        self._recorded = recorded
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return what is recorded, see `Asked.whole`."""
-        thetas, part, eights = asked.thetas, asked.part, self._eights(asked)
-        rate = self._felt(asked, eights, np.asarray(part.rate))
-        found = self._states(thetas, eights, len(asked.numbers.modulus), rate, part)
+        thetas, part = asked.thetas, jax.tree.map(np.asarray, asked.part)
+        found = self._states(asked, self._felt(asked, part.rate, part.kinematics), part)
         stress, felt, of_modes = found[..., 0], found[..., 1], found[..., 2:]
         beside = [stress[..., None], of_modes] if asked.whole else []
         if np.any(thetas[:, self._distorting]):
             present = self._fluid.present(thetas)
-            stress = np.concatenate(
-                [
-                    self._recorded(eight, present, part, stress[at], felt[at])
-                    for (eight, _), at in zip(eights.pairs, eights.places, strict=True)
-                ]
-            )[: len(thetas)]
+            stress = self._recorded(per_run(thetas), present, part, stress, felt)
         return np.concatenate([stress[..., None], *beside], axis=-1)
 
-    def _states(self, thetas, eights: Eights, declared: int, rate, part) -> np.ndarray:
+    def _states(self, asked: Asked, rate: np.ndarray, part: SteadyFlows) -> np.ndarray:
         """Return stresses, felt rates and the modes', shape (trials, runs, n, 2 + s)."""
-        own = np.asarray(part.rate)
+        own, packed = part.rate, self._packed(*asked[:3])
         # behind the last there are copies of it
         changes = np.diff(own, axis=1) != 0.0
         last = own.shape[1] - 1 - np.argmax(changes[:, ::-1], axis=1) if changes.size else 0
@@ -263,11 +256,11 @@ class SteadySideBySide(StatePredictor):
         place = np.minimum(np.arange(own.shape[1]), last[:, None])
         of_run, at = np.nonzero(np.arange(own.shape[1]) <= last[:, None])
         flows = flows_of(part.kinematics)
-        out = np.empty((len(thetas), *own.shape, 2 + self._code.size))
+        out = np.empty((len(rate), *own.shape, 2 + self._code.size))
 
         def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             row, column = of_run[state], at[state]
-            given = eights.packed.of_lanes(trial, declared) | {
+            given = packed.of_lanes(trial, asked.declared) | {
                 "rate": lanes_last(rate[trial, row, column]),
                 "flow": lanes_last(flows[row]) if part.kinematics is not None else flows,
             }
@@ -275,5 +268,5 @@ class SteadySideBySide(StatePredictor):
             found = np.concatenate([stress[:, None], felt[:, None], of_modes], axis=1)
             out[trial, row, column] = np.moveaxis(found, 1, -1).reshape(-1, out.shape[-1])
 
-        self._by_states(thetas, [np.arange(len(of_run))], _AT_ONCE, solve)
+        self._by_states(asked.thetas, [np.arange(len(of_run))], _AT_ONCE, solve)
         return np.take_along_axis(out, place[None, :, :, None], axis=2)

@@ -12,7 +12,7 @@ from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.exponential_weights import KrogstadWeights
 from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of
+from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, per_run
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
@@ -240,15 +240,15 @@ class StressCode(Code):
 class StressSideBySide(LanePredictor):
     """Predictions of strains for one structure of law and effects.
 
-    `driven`: of a vector and a run: the true stress at step ends in Pa, the inertia of the tool in
-    Pa s², and the strain of what gives way in series.
+    `driven`: of vectors, the effects present, and runs: the true stress at step ends in Pa, the
+    inertia of the tool in Pa s², and the strain of what gives way in series.
     """
 
-    def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable, made_from: tuple):
-        super().__init__(fluid, code, made_from)
+    def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable):
+        super().__init__(fluid, code)
         signal = [e for e in fluid.structure.effects if isinstance(e, SignalEffect)]
         self._driving = self._amplitudes((*signal, *fluid.series))
-        self._driven = self._program("driven", driven, (None, 0), (0, None))
+        self._driven = driven
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return strains, see `Asked.whole`."""
@@ -263,15 +263,15 @@ class StressSideBySide(LanePredictor):
         self, asked: Asked, lanes: np.ndarray, used: np.ndarray, packed: dict[str, np.ndarray]
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
-        thetas, part = asked.thetas[lanes], asked.part
-        times, sample = np.asarray(part.times), np.asarray(part.sample_index)
+        thetas, part = asked.thetas[lanes], jax.tree.map(np.asarray, asked.part)
+        times, sample = part.times, part.sample_index
         last = np.max(sample, axis=1).astype(np.int64)
-        imposed = np.broadcast_to(np.asarray(part.imposed), (LANES, *times.shape))
-        inertia, given_way = np.zeros((LANES, len(times))), np.zeros(imposed.shape)
+        found = [part.imposed, np.zeros(1), np.zeros(1)]
         if np.any(thetas[:, self._driving]):
-            imposed, inertia, given_way = (np.asarray(of) for of in self._driven(thetas, part))
+            found = self._driven(per_run(thetas), self._fluid.present(thetas), part)
+        imposed, inertia, given_way = (np.broadcast_to(of, (LANES, *times.shape)) for of in found)
         given = packed | {
-            "imposed": np.moveaxis(imposed, 0, -1), "inertia": np.moveaxis(inertia, 0, -1),
+            "imposed": np.moveaxis(imposed, 0, -1), "inertia": inertia[:, :, 0].T,
             "last": last, "width": np.diff(times), "flow": flows_of(part.kinematics),
         }  # fmt: skip
         strain, of_modes = self._code(used, given, asked.whole)

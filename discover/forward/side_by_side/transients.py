@@ -1,12 +1,11 @@
 """Transients at a given rate of many vectors of parameters, eight side by side.
 
 Where a vector asks for it NumPy shapes the rate and distorts the signal, of all vectors and runs
-together; JAX does where an effect takes its arrays alone, for other flows than shear, and for steps
-of the rate at instants that are fitted.
+together.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -23,9 +22,9 @@ from discover.forward.side_by_side.predictors import (
     LanePredictor,
     MadeOnce,
     flows_of,
+    per_run,
 )
 from discover.forward.side_by_side.step import WEIGHTS
-from discover.programs import on_device
 from discover.programs.lanes import LANES
 
 # Vectors of the same times from which on weights of the steps are worth a table
@@ -34,108 +33,50 @@ _MANY = 8
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 JUMP = 1e-9
 
-_OF_RUNS = ("last", "pieces", "cycle", "width", "share", "period", "jump", "flow")
-
-
-class _Signals(NamedTuple):
-    """Runs as effects on rates and signals take them, with an axis of runs, in arrays of NumPy.
-
-    `sample`: positions of the samples among step ends. The others as of `TransientFlows`.
-    """
-
-    times: np.ndarray
-    commanded_rate: np.ndarray
-    clock_factor: np.ndarray
-    strain_before: np.ndarray
-    sample: np.ndarray
-    kinematics: None = None
-    steps: None = None
-
-    @classmethod
-    def of(cls, part: TransientFlows) -> "_Signals":
-        """Return all runs of a part."""
-        times, rate, sample, clock, strain = map(
-            np.asarray,
-            (part.times, part.commanded_rate, part.sample_index, part.clock_factor,
-             part.strain_before),
-        )  # fmt: skip
-        return cls(times, rate, clock[:, None], strain[:, None], sample)
-
-    def of_first(self, runs: int) -> "_Signals":
-        """Return the first runs, which are no padding."""
-        times, rate, clock, strain, sample, *_ = self
-        return _Signals(times[:runs], rate[:runs], clock[:runs], strain[:runs], sample[:runs])
-
-
-def _before_runs(thetas: Float[np.ndarray, "lanes p"]) -> Float[np.ndarray, "p lanes 1 1"]:
-    return thetas.T[..., None, None]
-
 
 class _Runs(NamedTuple):
-    """Runs as the kernel takes them, in arrays of NumPy.
+    """Runs in arrays of NumPy, and as the kernel takes them.
 
-    `pieces`, `share`, `width`: how many pieces each step has, and how long one is, over the step
-        and in s.
-    `jump`: width up to which a step only marks a jump of the rate, in s.
-    `cycle`, `period`: steps between which the cycle lies that a run's start brings back, the first
-        negative where there is none, and its length in s.
-    `rate`, `tool_rate`: without effects of the instrument, lanes of the former last, of the latter
-        first.
+    `given`: by the names of its arrays, without effects of the instrument. `pieces`, `share`,
+    `width`: how many pieces each step has, and how long one is, over the step and in s. `jump`:
+    width up to which a step only marks a jump of the rate, in s. `cycle`, `period`: steps between
+    which the cycle lies that a run's start brings back, the first negative where there is none, and
+    its length in s.
     """
 
-    last: np.ndarray  # how many steps of each are taken
-    cycle: np.ndarray
-    period: np.ndarray
-    pieces: np.ndarray
-    width: np.ndarray
-    share: np.ndarray
-    jump: np.ndarray
-    flow: np.ndarray  # kinematics of each run
-    signals: _Signals  # what effects on rates and signals take
-    rate: np.ndarray
-    tool_rate: np.ndarray
+    flows: TransientFlows
+    given: dict[str, np.ndarray]
     in_shear: bool
 
 
 def _runs(part: TransientFlows) -> _Runs:
     """Return runs as the kernel takes them."""
-    # as commanded, where no instant at which it steps is fitted
-    commanded = np.asarray(part.commanded_rate)
-    rate = np.repeat(commanded[..., None], LANES, axis=-1)
-    tool_rate = np.tile(commanded[:, ::2], (LANES, 1, 1))
-    times = np.asarray(part.times)[:, ::2]
-    last, pieces = np.asarray(part.last_step), np.asarray(part.pieces)
-    flow = part.kinematics
-    cycle = np.asarray(part.cycle).astype(np.int64)
+    flows = jax.tree.map(np.asarray, part)
+    times, last, cycle = flows.times[:, ::2], flows.last_step, flows.cycle.astype(np.int64)
     ends = np.take_along_axis(times, np.maximum(cycle, 0), axis=1)
-    return _Runs(
+    given = {
+        # as commanded, where no instant at which it steps is fitted
+        "rate": np.repeat(flows.commanded_rate[..., None], LANES, axis=-1),
         # one step more than its samples need, since effects of the signal look at its rate
-        np.minimum(last + 1, np.max(last)).astype(np.int64),
-        cycle,
-        np.where(cycle[:, 0] < 0, 1.0, np.diff(ends, axis=1)[:, 0]),
-        pieces,
-        np.diff(times) / pieces,
-        1.0 / pieces,
-        JUMP * times[:, -1],
-        flows_of(part.kinematics),
-        _Signals.of(part),
-        rate,
-        tool_rate,
-        flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
-    )
-
-
-def _placed(part: TransientFlows) -> TransientFlows:
-    """Return runs as JAX holds them, so that they are handed over once."""
-    return jax.tree.map(on_device, part)
+        "last": np.minimum(last + 1, np.max(last)).astype(np.int64),
+        "cycle": cycle,
+        "period": np.where(cycle[:, 0] < 0, 1.0, np.diff(ends, axis=1)[:, 0]),
+        "pieces": flows.pieces,
+        "width": np.diff(times) / flows.pieces,
+        "share": 1.0 / flows.pieces,
+        "jump": JUMP * times[:, -1],
+        "flow": flows_of(flows.kinematics),
+    }
+    flow = flows.kinematics
+    return _Runs(flows, given, flow is None or bool(np.any(flow.is_shear)))
 
 
 class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
-    `rates`: of a vector, the effects present, and a run: the felt rate at ends and middles of
-    steps, and the tool's at ends. `distorted`: of these, the stress and both rates, what would be
-    recorded at ends.
+    `rates`: of vectors, the effects present, and runs: the felt rate at ends and middles of steps,
+    and the tool's at ends. `distorted`: of these, the stress and both rates, what would be recorded
+    at ends.
     """
 
     def __init__(
@@ -144,26 +85,15 @@ class SideBySide(LanePredictor):
         code: Kernel,
         rates: Callable,
         distorted: Callable,
-        made_from: tuple,
     ):
-        super().__init__(fluid, code, made_from)
-        self._in_numpy = rates, distorted
+        super().__init__(fluid, code)
+        self._rates, self._distorted = rates, distorted
         effects, still = fluid.structure.effects, KinematicEffect.felt_rate
         shaping = [e for e in effects if isinstance(e, KinematicEffect)]
         shaping = [e for e in shaping if type(e).felt_rate is not still]
         distorting = [e for e in effects if isinstance(e, SignalEffect)]
         self._shaping, self._distorting = map(self._amplitudes, (shaping, distorting))
-        others = [e for e in (*shaping, *distorting) if not e.takes_numpy]
-        self._only_jax = self._amplitudes(others)
-
-        def recorded(theta, present, run, *signals):
-            return distorted(theta, present, run, *signals)[run.sample_index]
-
-        axes = (None, None, 0), (0, None, None)
-        self._rates = self._program("rates", rates, *axes, vectors_to=(-1, 0))
-        axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
-        self._recorded = self._program("recorded", recorded, *axes)
-        self._runs, self._placed = MadeOnce(_runs), MadeOnce(_placed)
+        self._runs = MadeOnce(_runs)
         self._known_table: tuple | None = None
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
@@ -184,66 +114,36 @@ class SideBySide(LanePredictor):
         asked: Asked,
         laid_out: _Runs,
         used: np.ndarray,
-        table: tuple[float, np.ndarray | None],
+        table: tuple[float, Any],
         packed: dict[str, np.ndarray],
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
-        thetas, part, runs, declared = asked.thetas, asked.part, asked.runs, asked.declared
-        rate, tool_rate = laid_out.rate, laid_out.tool_rate
-        is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
-        if part.steps is not None or is_shaped:
-            rate, tool_rate = self._shaped(thetas, part, laid_out.signals)
-        time, tabled = table
-        if tabled is None or np.any(thetas[:, 1] != time):
-            tabled, declared = np.zeros(WEIGHTS), 0
-        given = packed | {
-            "rate": rate, "table": tabled,
-            **{name: getattr(laid_out, name) for name in _OF_RUNS},
-        }  # fmt: skip
+        thetas, runs, declared = asked.thetas, asked.runs, asked.declared
+        flows, given, in_shear = laid_out
+        given, tool_rate = given | packed, flows.commanded_rate[:, ::2]
+        columns, present = per_run(thetas), self._fluid.present(thetas)
+        if flows.steps is not None or (in_shear and np.any(thetas[:, self._shaping])):
+            rate, tool_rate = self._rates(columns, present, flows)
+            rate = np.broadcast_to(rate, (LANES, *rate.shape[-2:]))
+            given["rate"] = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
+        time, given["table"] = table
+        if given["table"] is None or np.any(thetas[:, 1] != time):
+            given["table"], declared = np.zeros(WEIGHTS), 0
         stress, felt, of_modes = self._code(runs, declared, used, given, asked.whole)
-        places = np.arange(runs)[:, None], laid_out.signals.sample[:runs]
+        places = np.arange(runs)[:, None], flows.sample_index[:runs]
         at_samples, beside = stress[places], []
         if asked.whole:
             own = (at_samples[:, :, None], of_modes[places])
             beside = [np.moveaxis(of, -1, 0) for of in own]
-        if not (laid_out.in_shear and np.any(thetas[:, self._distorting])):
+        if not (in_shear and np.any(thetas[:, self._distorting])):
             return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
-        beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
-        felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
-        signals = laid_out.signals.of_first(runs)
-        found = self._at_samples(thetas, part, signals, stress, felt, tool_rate)
-        return np.concatenate([found[..., None], *beside], axis=-1)
-
-    def _is_plain(self, thetas: np.ndarray, part: TransientFlows) -> bool:
-        plain = part.steps is None and part.kinematics is None
-        return plain and not np.any(thetas[:, self._only_jax])
-
-    def _shaped(
-        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the felt rate, lanes last, and the tool's, lanes first."""
-        present = self._fluid.present(thetas)
-        if not self._is_plain(thetas, part):
-            felt, of_tool = self._rates(thetas, present, self._placed(part))
-            return np.asarray(felt), np.asarray(of_tool)
-        found = self._in_numpy[0](_before_runs(thetas), present, signals)
-        felt, of_tool = (np.broadcast_to(of, (LANES, *of.shape[-2:])) for of in found)
-        return np.ascontiguousarray(np.moveaxis(felt, 0, -1)), of_tool
-
-    def _at_samples(
-        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals, stress, felt, of_tool
-    ) -> Float[np.ndarray, "lanes runs n"]:
-        """Return what samples record, of stress and felt rate at ends, lanes last."""
-        present, runs = self._fluid.present(thetas), len(signals.times)
-        if not self._is_plain(thetas, part):
-            found = self._recorded(thetas, present, self._placed(part), stress, felt, of_tool)
-            return np.asarray(found)[:, :runs]
-        given = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
+        beyond = np.arange(stress.shape[1]) > given["last"][:, None]
+        felt[beyond], stress[beyond] = given["rate"][:, ::2][beyond], 0.0
+        flows = jax.tree.map(lambda leaf: leaf[:runs], flows)
+        signals = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
         with np.errstate(all="ignore"):  # of a vector that runs away
-            found = self._in_numpy[1](
-                _before_runs(thetas), present, signals, *given, of_tool[:, :runs]
-            )
-        return found[:, np.arange(runs)[:, None], signals.sample]
+            found = self._distorted(columns, present, flows, *signals, tool_rate[..., :runs, :])
+        return np.concatenate([found[:, *places][..., None], *beside], axis=-1)
 
     def _table(
         self, numbers: Numbers, part: TransientFlows, time: float, count: int
@@ -255,7 +155,7 @@ class SideBySide(LanePredictor):
         # those of chains that retract depend on more than the times
         if numbers.law.retracts or (count < _MANY and time != 0.0):
             return time, None
-        width = self._runs(part).width
+        width = self._runs(part).given["width"]
         h = width[..., None] / (np.asarray(own) * np.exp(time))
         weights = krogstad_weights(-float(numbers.law.linear_relaxation) * h, h)
         found = np.stack(weights[:WEIGHTS], axis=-1)

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import observed_on_grid
+from discover.forward.fluids import observed_in_reverse
 from discover.forward.of_fluids import pieces_in_time
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
 from discover.learners.files import kept_in_files
@@ -74,15 +74,6 @@ class TrainingProblem(eqx.Module):
         """Return the fluid of a trial law."""
         return Fluid(law, self.modulus, self.relaxation_time, self.solvent_viscosity)
 
-    def predicted(
-        self, law: AbstractConstitutiveLaw, adjoint: Any = None
-    ) -> Float[Array, "runs n"]:
-        """Return what is recorded of a trial law."""
-        fluid = self.fluid(law)
-        return self.flows.over(
-            lambda protocol, grid: observed_on_grid(fluid, protocol, grid, adjoint)[:, 0]
-        )
-
     def mean_squared_errors(self, law: AbstractConstitutiveLaw) -> Float[Array, " runs"]:
         """Return the mean squared error of each run, of stresses over the sum of the moduli.
 
@@ -91,11 +82,14 @@ class TrainingProblem(eqx.Module):
         """
         import diffrax  # a second, of which no other recipe has any use
 
-        in_reverse = diffrax.RecursiveCheckpointAdjoint()
+        fluid, in_reverse = self.fluid(law), diffrax.RecursiveCheckpointAdjoint()
+        predicted = self.flows.over(
+            lambda protocol, grid: observed_in_reverse(fluid, protocol, grid, in_reverse)[:, 0]
+        )
         weight, total = self.records.weight, jnp.sum(self.modulus)
         unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))
         scale = jnp.where(weight > 0, weight * unit[:, None], 1.0)
-        errors = self.records.residual(self.predicted(law, in_reverse)) / scale
+        errors = self.records.residual(predicted) / scale
         return jnp.sum(errors**2, axis=1) / jnp.sum(weight > 0, axis=1)
 
 

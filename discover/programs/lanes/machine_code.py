@@ -1,7 +1,6 @@
 """Machine code of a function written for LLVM, with the loops that hold it."""
 
 import ctypes
-import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -10,16 +9,8 @@ from typing import Any
 import llvmlite.binding as llvm
 import llvmlite.ir as ir
 
+from discover.programs import store
 from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER
-from discover.programs.store import (
-    NotDescribable,
-    fingerprint,
-    load_program,
-    program_folder,
-    save_program,
-)
-
-_LOGGER = logging.getLogger(__name__)
 
 _NAME = "predict"
 
@@ -142,29 +133,8 @@ def callable_of(code: bytes, counts: int, arrays: int) -> Callable[..., None]:
 
 
 def kept(made_from: Any, write: Callable[[], tuple[bytes, bool]]) -> bytes:
-    """Return machine code that an earlier start made of the same, or write and keep it.
-
-    It lies with the programs (`discover.programs.store`). `made_from`: what tells it from other
-    code; what no digest describes, a user's own code, is not kept. `write`: returns the code, and
-    whether it stands alone: what calls functions of this process is not kept either.
-    """
-    folder = program_folder()
-    if folder is None:
-        return write()[0]
-    try:
-        name = fingerprint(
-            ("lanes", _LEVELS, _LEVELS_OF_LARGE, *_processor(), made_from), False
-        ).hex()
-    except (NotDescribable, TypeError, ValueError) as reason:
-        _LOGGER.debug("machine code is made at every start: %s", reason)
-        return write()[0]
-    found = load_program(folder / name)
-    if found is not None:
-        return found[1]
-    code, stands_alone = write()
-    if stands_alone:
-        save_program(folder / name, None, code)
-    return code
+    """Return machine code for this processor as `discover.programs.store.kept` does."""
+    return store.kept((_LEVELS, _LEVELS_OF_LARGE, *_processor(), made_from), write)
 
 
 def _machine(level: int) -> llvm.TargetMachine:
