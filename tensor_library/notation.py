@@ -16,7 +16,7 @@ class Notation:
     A notation of another kind, such as expressions, answers each question by itself.
     """
 
-    tensors: Mapping[str, str]
+    tensors: Mapping[str, Any]
     dot: str  # between tensors
     plus = " + "
     times: str  # between factors

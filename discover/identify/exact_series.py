@@ -55,7 +55,8 @@ class ExactNotation(Notation):
     def exponential(self, rate, trace):
         return self.forms[rate]
 
-    saturating = exponential
+    def saturating(self, level, trace):
+        return self.forms[level]
 
     def function(self, expression, trace, parameter):
         return self.forms[parameter]
@@ -166,7 +167,8 @@ def solve_for_coefficient(
             continue
         polynomial = Poly({(c,): value for (_, c), value in excess.items()}, Symbol(UNKNOWN))
         candidates = []
-        for root in sorted(set(polynomial.real_roots()), key=abs):
+        roots: set[Any] = set(polynomial.real_roots())
+        for root in sorted(roots, key=lambda one: abs(float(one))):
             if not root.is_Rational:
                 candidates.append((float(root), False))
                 continue

@@ -24,6 +24,8 @@ from tensor_library import LawTerms, TermLibrary, parse_term
 STRAIN_STEP = 0.1
 """Largest strain of a step."""
 
+_SHEAR: FlowKind = "shear"
+
 
 def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary:
     """Return a library that also holds the terms of some laws."""
@@ -90,7 +92,8 @@ def random_histories() -> tuple[Run, ...]:
         weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
         frequencies = generator.uniform(0.1, 3.0, _WAVES)
         phases = generator.uniform(0.0, 2.0 * np.pi, _WAVES)
-        flow = FlowProtocol(none, none, *map(on_device, (weights, frequencies, phases)))
+        waves = on_device(weights), on_device(frequencies), on_device(phases)
+        flow = FlowProtocol(none, none, *waves)
         runs.append(bare_run(flow, times))
     return tuple(runs)
 
@@ -197,11 +200,12 @@ def separations(
     Oscillations and start-ups of shear, which need the fewest new instruments, then start-ups of
     uniaxial and planar extension. `stresses`: from `stresses_in_histories`.
     """
-    starts = [(kind, rate) for kind in ("uniaxial", "planar") for rate in _EXTENSION_RATES]
+    kinds: tuple[FlowKind, ...] = "uniaxial", "planar"
+    starts = [(kind, rate) for kind in kinds for rate in _EXTENSION_RATES]
     times = np.linspace(0.0, _DURATION, 161)
     runs = [bare_run(in_flow(start_up(rate), kind), times) for kind, rate in starts]
     extension = stresses_of_laws(library, laws, runs, base, strain_step=np.inf)
-    flows = [("shear", name) for name in ordinary_flows()]
+    flows: list[tuple[FlowKind, str]] = [(_SHEAR, name) for name in ordinary_flows()]
     flows += [(kind, f"{kind} extension at a rate of {rate:g}") for kind, rate in starts]
     shear = stresses[:, len(random_histories()) :]
     reference, *others = ([*a, *b] for a, b in zip(shear, extension, strict=True))

@@ -192,7 +192,11 @@ def of_stress(result: Any) -> ExpectedError:
 
 def measured(result: Any, kind: str) -> ExpectedError | None:
     """Return the error of what was measured, of unseen runs if there are any; None without."""
-    records, noise = (*result.records, *result.unfitted), result.noise_floor
+    return error_of((*result.records, *result.unfitted), kind, result.noise_floor)
+
+
+def error_of(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
+    """Return `measured` of some records; `noise`: relative, which is subtracted."""
     own = [record for record in records if _is(record, kind)]
     if not own:
         return None
