@@ -23,7 +23,7 @@ from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.posterior import by_all_runs, near_the_likeliest, posterior_of
-from discover.inference.engine.search import Search, without_by_mode
+from discover.inference.engine.search import Search, with_one_constant, without_by_mode
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
@@ -121,7 +121,8 @@ class Task:
         """Return the search among what a declared model lacks.
 
         `before`: one with other constants by mode, of which all is kept that does not depend on
-        these. Raises InputError if the model cannot be integrated through the fitted runs.
+        these, and what is likely is fitted anew. Raises InputError if the model cannot be
+        integrated through the fitted runs.
         """
         problem = self.problem(declared)
         self.say(f"search among {len(problem.candidates)} effects")
@@ -131,8 +132,17 @@ class Task:
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
             )
-        known = {} if before is None else without_by_mode(before, fitter)
-        return Search(fitter, self.most, self.say, known).run()
+        if before is None:
+            return Search(fitter, self.most, self.say).run()
+        search = Search(fitter, self.most, self.say, without_by_mode(before, fitter)).run()
+        likely = near_the_likeliest(before)
+        # what the search passes over, for many constants by mode are many to fit from nothing
+        search.add(
+            fitter.start(fit.names, with_one_constant(fit, before.problem, problem), fit.linear)
+            for fit in likely
+            if frozenset(fit.names) not in search.found
+        )
+        return search
 
     def explained(self, declared: DeclaredModel) -> Posterior:
         """Return the posterior over what a declared model lacks.

@@ -283,8 +283,9 @@ def near_the_likeliest(search: Search) -> list[Fit]:
 def by_all_runs(search: Search, done: Search | None = None) -> Search:
     """Return what is likely by the fitted runs, fitted to all, those too that are to be predicted.
 
-    These judge: nothing is named that they alone would ask for. `done`: what was fitted to all
-    before, beside which others come.
+    These judge: where the likeliest leaves something of all, nothing else is looked for that may
+    leave less, and where it leaves nothing, what is as good. `done`: what was fitted to all before,
+    beside which others come.
     """
     problem, fits = search.problem, near_the_likeliest(search)
     if problem.predicted is None:
@@ -299,7 +300,10 @@ def by_all_runs(search: Search, done: Search | None = None) -> Search:
             return done
         done = done.copied()
         done.add([done.fitter.start(fit.names, fit.theta) for fit in new])
-    return done.backwards()
+    alive = done.backwards().alive()
+    if alive and _left_by(done, alive[0]).log_factor + LOG_ODDS_OF_NONE < 0.0:
+        done.exchange()
+    return done
 
 
 def _left_by(search: Search, fit: Fit) -> Discrepancy:

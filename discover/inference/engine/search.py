@@ -6,9 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.priors import Priors
+from discover.inference.engine.problem import Problem
 
 _BEAM = 3
 _REFITTED = 8
@@ -287,8 +289,15 @@ def without_by_mode(search: Search, fitter: Fitter) -> dict[Key, Fit]:
     shift, found = new.declared.size - first, {}
     for key, fit in search.found.items():
         if key.isdisjoint(differ):
-            theta, of_law = new.zero.copy(), 2 + len(old.declared.free_parameters)
-            theta[:of_law], theta[first + shift :] = fit.theta[:of_law], fit.theta[first:]
+            theta = with_one_constant(fit, old, new)
             priors = {at if at < first else at + shift: own for at, own in fit.priors.items()}
             found[key] = replace(fit, theta=theta, priors=Priors(priors), memory={**fit.memory})
     return found
+
+
+def with_one_constant(fit: Fit, old: Problem, new: Problem) -> Float[np.ndarray, " p"]:
+    """Return the constants of a fit in a problem with others by mode, each one for all modes."""
+    theta, of_law = new.zero.copy(), 2 + len(old.declared.free_parameters)
+    theta[:of_law] = fit.theta[:of_law]
+    theta[new.declared.size :] = fit.theta[old.declared.size :]
+    return theta
