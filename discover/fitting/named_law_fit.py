@@ -15,7 +15,7 @@ from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS, Fluid
-from discover.loop.by_quantity import measured
+from discover.loop.by_quantity import of_records
 from discover.loop.fitted_range import range_of
 from discover.loop.runs import RunRecord
 from discover.summary_view import Estimate, PageView, SummaryView
@@ -109,7 +109,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         """The law with its constants, how well it describes the runs, and where."""
         equation = self.written and self.equation()
         law = LAWS[self.law]
-        expected = {name: measured(self.records, name, self.noise) for name in QUANTITIES}
+        expected = {name: of_records(self.records, name, self.noise) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
         answer = Answer(
             law.title,
