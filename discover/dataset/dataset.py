@@ -205,14 +205,15 @@ class Dataset(NotebookView):
     def quantity_by_quantity(self) -> "Dataset":
         """Return the data with N1 and N2, where recorded, as runs of their own: ``"a.csv (N1)"``.
 
-        Samples that no fluid can have are left out; a run of nothing else is set aside.
+        Samples that no fluid can have are left out; a run of nothing else is set aside. Records
+        that are runs of their own already stay as they are.
         """
         late, never = sound_normal_stress(self.runs, self.linear_sweep)
         aside = {f"{name} (N1)": why for name, why in never.items()}
         seen: list[Run] = []
         for run in self.runs:
             records = [run.observing(name) for name in run.beside]
-            kept = [record for record in records if record.name not in aside]
+            kept = [one for one in records if one.name not in {*aside, *self.names}]
             seen += [run, *(_from_then_on(record, late.get(run.name)) for record in kept)]
         return replace(self, runs=tuple(seen), set_aside={**self.set_aside, **aside})
 

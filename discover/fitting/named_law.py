@@ -156,7 +156,9 @@ def fit(
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
         ended.verdict == "no_effect_needed", ended.noise,
         None if left is None else Discrepancy(**left), tuple(ended.records),
-        model, best.theta, declared_law(forward, best.theta, {}), data.name, tolerance,
+        model, best.theta, declared_law(forward, best.theta, {}),
+        {name: value for name, value in fixed.items() if name in LAWS[law].parameters},
+        data.name, tolerance,
         temperature_of(fitted),
     )  # fmt: skip
 

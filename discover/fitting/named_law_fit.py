@@ -1,7 +1,7 @@
 """The result of fitting one named law."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -15,7 +15,7 @@ from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS, Fluid
-from discover.loop.by_quantity import error_of
+from discover.loop.by_quantity import of_records
 from discover.loop.fitted_range import range_of
 from discover.loop.runs import RunRecord
 from discover.summary_view import Estimate, PageView, SummaryView
@@ -27,7 +27,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     """One named law fitted to runs.
 
     `law`: its name, as in `discover.laws`. `constants`, `covariance`: what was fitted, and its
-    covariance as fitted (moduli and times as logarithms), (p, p). `effects`: values of fitted and
+    covariance as fitted (moduli and times as logarithms), (p, p). `fixed`: constants of the law
+    that were not fitted, by name. `effects`: values of fitted and
     declared effects, by name. `fits_to_the_noise`, `noise`: whether what the fit leaves of the runs
     is noise, and relative noise, mean over the runs. `discrepancy`: size of what the fit leaves
     besides; None where nothing is said. `records`: the runs, measured and predicted, those held out
@@ -49,6 +50,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     model: AugmentedModel
     theta: Float[np.ndarray, " all"]
     written: Equation | None = None
+    fixed: Mapping[str, float] = field(default_factory=dict)
     title: str = ""
     tolerance: float = TOLERANCE
     temperature_C: float | None = None
@@ -109,12 +111,15 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         """The law with its constants, how well it describes the runs, and where."""
         equation = self.written and self.equation()
         law = LAWS[self.law]
-        expected = {name: error_of(self.records, name, self.noise) for name in QUANTITIES}
+        expected = {name: of_records(self.records, name, self.noise) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
         answer = Answer(
             law.title,
             self.law,
-            tuple(Constant(one.key[0], one.value, one.ci95, one.unit) for one in self.constants),
+            (
+                *(Constant(name, value) for name, value in self.fixed.items()),
+                *(Constant(one.key[0], one.value, one.ci95, one.unit) for one in self.constants),
+            ),
             tuple(Mode(float(modulus), float(time)) for modulus, time in zip(*modes, strict=True)),
             float(self.fluid.solvent_viscosity),
             self.error,

@@ -191,12 +191,14 @@ def of_stress(result: Any) -> ExpectedError:
 
 
 def measured(result: Any, kind: str) -> ExpectedError | None:
-    """Return the error of what was measured, of unseen runs if there are any; None without."""
-    return error_of((*result.records, *result.unfitted), kind, result.noise_floor)
+    """Return the error of what was measured of a quantity, fitted or not; None without."""
+    return of_records((*result.records, *result.unfitted), kind, result.noise_floor)
 
 
-def error_of(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
-    """Return `measured` of some records; `noise`: relative, which is subtracted."""
+def of_records(
+    records: Sequence[RunRecord], kind: str, noise: float | None
+) -> ExpectedError | None:
+    """Return the error of records of a quantity, of unseen ones if there are any; None without."""
     own = [record for record in records if _is(record, kind)]
     if not own:
         return None

@@ -90,8 +90,8 @@ def _turns(record: RunRecord) -> bool:
 
 
 def _test(record: RunRecord) -> str:
-    """Return what a transient is, in words; empty of what turns, and of states."""
-    if not record.is_transient or _turns(record):
+    """Return what a transient is, in words; empty of what turns, is at rest, and of states."""
+    if not record.is_transient or _turns(record) or record.fastest == 0.0:
         return ""
     if record.control == "stress":
         return "creep"

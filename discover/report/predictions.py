@@ -40,9 +40,10 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
     """Return the curves of a comparison: declared law, learners and posterior, in every flow.
 
     Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` are the 95 % band of the
-    posterior; the sparse law has it where the quantity is determined, else NaN, as has ``measured``
-    where nothing was. Flows over which only errors are mapped are left out, and a law has no line
-    in a flow that it cannot be integrated through.
+    posterior; the sparse law has it in runs that it did not see, where the quantity is determined
+    (the band of a fitted run is that of its own loading, which this law has not), else NaN, as has
+    ``measured`` where nothing was. Flows over which only errors are mapped are left out, and a law
+    has no line in a flow that it cannot be integrated through.
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}
@@ -98,7 +99,7 @@ def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[
     """Return the band of predictions in a flow, by quantity; empty for no claim."""
     if who == POSTERIOR:
         band = comparison.bands.get(flow.key)
-    elif who == "tensor_sindy" and comparison.determined_terms:
+    elif who == "tensor_sindy" and comparison.determined_terms and flow.kind != "training":
         band = comparison.claimed(flow)
     else:
         band = None

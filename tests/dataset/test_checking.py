@@ -225,6 +225,8 @@ def test_a_normal_stress_that_no_fluid_has_is_neither_fitted_nor_judges(folder):
     told = {"folder": str(path), "observe": ["sigma12", "N1"]}
     study = load_study_data(parse_study({"data": told}))
     assert study.fit.names == seen.names
+    # data that are so already stay as they are
+    assert seen.quantity_by_quantity().names == seen.names
     # the control: where that is all there is, it is said why there is none
     told = {"folder": str(folder(bad)), "observe": ["N1"]}
     with pytest.raises(InputError, match="cannot be right early"):

@@ -48,6 +48,21 @@ def test_another_test_is_no_repeat(other):
     assert repeated_tests([first, second]) == ()
 
 
+@pytest.mark.parametrize(
+    "after",
+    [
+        lambda size: dc.after_step_strain(dc.start_up(0.0), size, first=TIMES[0]),
+        lambda size: dc.after_steady_flow(dc.start_up(0.1), size, end=TIMES[-1]),
+    ],
+    ids=["step strain", "steady flow"],
+)
+def test_what_a_protocol_did_before_the_record_makes_another_test(after):
+    sizes = enumerate((0.5, 2.0, 5.0, 5.0))
+    runs = [replace(record(f"{i}", seed=i), protocol=after(size)) for i, size in sizes]
+    assert count_flows(runs) == 3
+    assert repeated_tests(runs) == (("2", "3"),)
+
+
 def waving(name, times):
     rates = 2.0 * np.cos(times)
     stress = Giesekus(0.3).respond(oscillation(2.0, 1.0), times).sigma12

@@ -132,6 +132,9 @@ def test_a_wrong_law_a_constant_at_its_end_and_a_fixed_one_are_said(data):
     assert found.summary().loc["alpha", "at_bound"]
     assert found.text.count("end of its range: alpha") == 1
     found = dc.fit("giesekus", data, fixed={"alpha": 0.25})
+    # a simulation needs it as well as those that were fitted
+    assert found.use["constants"]["alpha"] == {"value": 0.25, "ci95": None, "unit": "1"}
+    assert "α = 0.25" in found.text
     assert list(found.summary().index) == ["modulus_Pa", "relaxation_time_s"]
     wrong = dc.fit("ucm", data, held_out=["6"])
     assert not wrong.fits_to_the_noise

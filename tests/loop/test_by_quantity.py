@@ -12,7 +12,7 @@ from discover.forward import AugmentedModel, DeclaredModel
 from discover.loop.answering import _constants, shows_a_derivative
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread, falls_above
-from discover.loop.fitted_range import range_of
+from discover.loop.fitted_range import described, range_of
 from discover.loop.from_posterior import Ended
 from discover.loop.parts import ErrorPair, Stage, StageParameter
 from discover.loop.runs import RunRecord
@@ -379,6 +379,9 @@ def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():
     assert range_of([*FITTED, down, replace(FITTED[0], control="stress")]).tests == (
         "steps of rate", "start-up", "creep",
     )  # fmt: skip
+    # relaxation after a step strain: at rest, so of no rate
+    assert described(record("relaxation.csv", 0.0, 0.1)) == "relaxation.csv"
+    assert described(FITTED[0]) == "the start-up at 0.1 1/s (slow)"
     backwards = replace(wave, rate=-wave.rate)
     assert range_of([backwards]) == range_of([wave])  # a start-up in the other direction
     reversed_once = replace(wave, rate=np.array([1.0, 1.0, 1.0, -1.0, -1.0]))

@@ -94,6 +94,9 @@ def test_bands_stand_where_a_claim_is_made_and_nowhere_else():
     assert set(claimed["role"]) == {"prediction"}
     assert set(claimed["source"]) == {"tensor_sindy", "posterior"}
     np.testing.assert_allclose(claimed["high95"] - claimed["low95"], 1.0)
+    # a fitted run's band is of its own loading: it stands with the posterior, which has that
+    table = comparison_predictions(comparison(flows, of(flows), {flows[0].key: band}))
+    assert set(table.dropna(subset=["low95"])["source"]) == {"posterior"}
 
 
 @pytest.mark.parametrize("missing", [None, {}])

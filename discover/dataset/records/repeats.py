@@ -66,8 +66,20 @@ def _same_test(one: Run, other: Run) -> bool:
     longer = max((one, other), key=lambda run: run.time[-1])
     if np.ptp(times) < _SHARED * max(np.ptp(one.time), np.ptp(other.time)):
         times = np.append(times, longer.time[longer.time > times[-1]])
+    return all(_same_rates(one, other, some) for some in (times, _before(one, other)))
+
+
+def _same_rates(one: Run, other: Run, times: np.ndarray) -> bool:
     rates = shear_rates(one.protocol, times), shear_rates(other.protocol, times)
-    return bool(np.max(np.abs(rates[0] - rates[1])) <= _SAME * np.max(np.abs(rates[0])))
+    off, most = np.max(np.abs(rates[0] - rates[1]), initial=0.0), np.max(np.abs(rates), initial=0.0)
+    return bool(off <= _SAME * most)
+
+
+def _before(one: Run, other: Run) -> np.ndarray:
+    """Return times between the knots of both protocols before the record: of a step, a flow."""
+    knots = [np.asarray(run.protocol.table_times) for run in (one, other)]
+    ahead = np.unique(np.minimum(np.concatenate(knots), 0.0))
+    return 0.5 * (ahead[1:] + ahead[:-1])
 
 
 def _alike(one: object, other: object) -> bool:
