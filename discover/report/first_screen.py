@@ -25,9 +25,11 @@ _COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
 
 def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
-    if answer is None:
-        return None
-    written, answer = answer, modes.at_use(answer)  # what is copied keeps the reference
+    return None if answer is None else _screen(answer, modes.at_use(answer))
+
+
+def _screen(written: Answer, answer: Answer) -> dict[str, Any]:
+    """Return what the page shows of an answer, and what it copies of it as it is written."""
     headline, quality = map(unbroken, sentences.first_lines(answer))
     symbols = [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
@@ -73,7 +75,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 def _fitted(written: Answer, answer: Answer) -> tuple[str, str]:
     """Return in which flows constants were fitted and where times hold, and times as written."""
     flows = f"fitted in {sentences.flows_of(answer.range.flows)}"
-    if written is not answer:
+    if written is not answer and written.temperature_C is not None:
         by = modes.scaled(answer.shift_factors[written.temperature_C]).replace(" by", " times by")
         reference = f"For {modes.reduced_to(written)} (copies, tables below) {by}."
         return f" at {modes.reduced_to(answer)} ({flows})", reference
