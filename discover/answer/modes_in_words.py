@@ -1,6 +1,7 @@
 """Modes of a law, and the temperature and shift factors of its times, in words."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from discover.words import significant
@@ -21,6 +22,24 @@ def scaled(factor: float) -> str:
     """Return what makes times of those at the reference temperature, in words."""
     by, way = (1.0 / factor, "divide") if factor < 1.0 else (factor, "multiply")
     return f"{way} by {significant(by, 3)}"
+
+
+def at_use(answer: Any) -> Any:
+    """Return an answer with its times at the temperature of the fitted runs, if they have one."""
+    at, factors, modes = [*answer.range.by_temperature], answer.shift_factors, answer.modes
+    by = factors.get(at[0]) if len(at) == 1 and answer.temperature_C is not None else None
+    if by is None:
+        return answer
+    rest = {t: a / by for t, a in {**factors, answer.temperature_C: 1.0}.items() if t != at[0]}
+    return replace(
+        answer,
+        constants=tuple(one.of_times(by) for one in answer.constants),
+        modes=tuple(replace(m, relaxation_time_s=by * m.relaxation_time_s) for m in modes),
+        solvent_viscosity_Pa_s=by * answer.solvent_viscosity_Pa_s,
+        temperature_C=at[0],
+        shift_factors=dict(sorted(rest.items(), reverse=True)),
+        range=replace(answer.range, rate_1_s=answer.range.by_temperature[at[0]].rate_1_s),
+    )
 
 
 def shifts(answer: Any) -> list[tuple[float, float]]:

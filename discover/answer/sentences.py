@@ -123,7 +123,7 @@ def description(answer: Any, brief: int = 0) -> str:
     """Return how well the law describes the runs, corrected for what, and if that is enough.
 
     `brief`: 1 without names of suspects, 2 without the worst run, 3 without interval, 4 without
-    whose errors several are, 5 without suspects: the table has them.
+    whose errors several are and what these lack, 5 without suspects: the table has them.
     """
     if not answer.title:
         return ""
@@ -133,8 +133,10 @@ def description(answer: Any, brief: int = 0) -> str:
     (note,) = (one.note for one in each.values()) if len(each) == 1 else ("",)
     on = note if note.partition(" ")[2].startswith("unseen") else "unseen runs"
     if answer.fits_to_the_noise and most <= answer.tolerance:
-        size = "≤ " * (len(each) > 1) + at_most(most)
-        said = f"Passes {on}: error {size} above noise{f' ({noise})' * bool(noise)}"
+        size, of = "≤ " * (len(each) > 1) + at_most(most), f" ({noise})" * bool(noise)
+        within = f"within {percent_of(answer.tolerance)} above"  # fits to the noise all the same
+        to = "to" if most <= (answer.noise or 0.0) else within
+        said = f"Predicts {on} {to} the noise{of}: {size} beyond it"
     elif answer.fits_to_the_noise:
         within = f"within the noise{f' of {noise}' * bool(noise)}"
         said = f"Fits {'the flow curve ' * answer.range.steady}{within}"
@@ -149,7 +151,7 @@ def description(answer: Any, brief: int = 0) -> str:
         if found.unseen:
             said = _of_unseen(answer, each, f"{size} on {on}", brief)
             own = own * (len(each) < 2 or "σ12" not in each)
-    enough = "" if said.startswith("Passes") else tolerance(answer, brief)
+    enough = "" if said.startswith(("Predicts", "Meets")) else tolerance(answer, brief)
     said = ", ".join(filter(None, [said, own * bool(said)]))
     return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
 
@@ -171,13 +173,18 @@ def _of_unseen(answer: Any, each: Mapping[str, Any], size: str, brief: int) -> s
     misses = f"Misses {whose} {percent_of(answer.tolerance)} tolerance: m" * _misses(answer) or "M"
     if len(each) < 2:
         return ", ".join([f"{misses}ean error {size}", *of_worst])
-    told, in_shear = [], answer.range.flows == ("shear",)
+    told, met, in_shear = [], {True: [], False: []}, answer.range.flows == ("shear",)
     for symbol, one in each.items():
         known = [*of_worst * in_shear, _corrected(answer, brief)] if symbol == "σ12" else []
-        known += [f"not corrected for {one.uncorrected}"] * bool(one.uncorrected)
-        behind = ", ".join(filter(None, known))
-        told.append(f"{symbol} {at_most(one.inside)}{f' ({behind})' * bool(behind)}")
+        known += [f"not corrected for {one.uncorrected}"] * bool(one.uncorrected and brief < 4)
+        behind, size = ", ".join(filter(None, known)), at_most(one.inside)
+        told.append(f"{symbol} {size}{f' ({behind})' * bool(behind)}")
+        split = f"{symbol} ({', '.join(filter(None, [size, behind]))})"
+        met[one.inside <= answer.tolerance].append(split)
     data = " on unseen data" * (brief < 4)
+    if met[True] and met[False]:
+        level, lacks = percent_of(answer.tolerance), listed(met[False])
+        return f"Meets {level}{data} for {listed(met[True])}, not for {lacks}"
     return f"{misses}ean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
@@ -188,14 +195,14 @@ def _misses(answer: Any) -> bool:
 
 
 def _corrected(answer: Any, brief: int) -> str:
-    """Return what of the instrument errors are corrected for; empty where nothing."""
+    """Return what of the instrument predictions of the records hold; empty where nothing."""
     names = [
-        f"{effect_title(one.effect)}{f', ≤ {percent_of(one.correction)}' * bool(one.correction)}"
+        f"{f'≤ {percent_of(one.correction)} ' * bool(one.correction)}{effect_title(one.effect)}"
         for one in answer.suspects[: None if brief < 5 else 0]
     ]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
-    told = listed(names) if few else f"{len(names)} measurement errors"
-    return f"corrected for {told}" if names else ""
+    told = f"{listed(names)} in records" if few else f"{len(names)} measurement errors"
+    return f"allowing for {told}" if names else ""
 
 
 _MOST_SUSPECTS, _OF_FITTED = 2, "Residual of the fitted runs"
@@ -294,7 +301,8 @@ def _place(answer: Any) -> str:
             ends = f"≤ {modes.short(one.deborah[1])}" if near else f"= {modes.span(one.deborah)}"
             slow = f" and De = λω {ends}"
         rate = "" if one.rate_1_s is None else f" ({modes.short(one.rate_1_s[1])} 1/s)"
-        return f"Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{rate}{slow}"
+        flows = listed([*one.tests, *["oscillatory shear"] * bool(one.deborah and one.oscillates)])
+        return f"{flows}{', ' * bool(flows)}Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{rate}{slow}"
     tests = f"{listed(one.tests)} at " if one.tests else ""
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""

@@ -16,6 +16,8 @@ from discover.words import significant
 _TURNS = 0.5
 # Share of the time of a run for which it is at most as slow as the slowest rate of its range
 _STAYS = 0.05
+# Share of the largest rate, and of the samples, from which on a rate passes and does not jump
+_PASSED = 0.1
 _SAME = 0.8  # Share of the largest rate above which a rate that was read is one rate
 # Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop
 _AT_REST = 1e-3
@@ -86,7 +88,11 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
 
 def _turns(record: RunRecord) -> bool:
     ways = np.sign(record.rate[np.abs(record.rate) > _TURNS * record.fastest])
-    return record.is_transient and bool(np.count_nonzero(np.diff(ways)) > 1)  # one: a reversal
+    # one is a reversal, unless the rate passes through all between, as in one cycle
+    sizes, jumps = np.abs(record.rate), np.abs(np.diff(record.rate)) > _TURNS * record.fastest
+    between = (sizes > _PASSED * record.fastest) & (sizes < _TURNS * record.fastest)
+    slow = np.mean(between) > _PASSED and not np.any(jumps)
+    return record.is_transient and bool(np.count_nonzero(np.diff(ways)) > (0 if slow else 1))
 
 
 def _test(record: RunRecord) -> str:

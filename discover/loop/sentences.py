@@ -123,8 +123,8 @@ def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            fits = f"{OF_SWEEP[name]} {Constant(name, one.value, one.ci95).measured('')} times"
-            return f"Measure sweep and runs on one rheometer filling: runs fit {fits} the sweep's."
+            are = f"{OF_SWEEP[name]} are {Constant(name, one.value, one.ci95).measured('')} times"
+            return f"Measure sweep and runs on one filling: the runs' {are} the sweep's."
     return ""
 
 
@@ -213,9 +213,11 @@ def _by_geometry(result: Any) -> str:
     """
     by_run = (result.discrepancy or {}).get("by_run", {})
     own = _sheared(result) or [record for record in result.records if not record.held_out]
-    worst = max(own, key=lambda r: by_run.get(r.name, float(r.errors[-1])), default=None)
-    run = "one run" if worst is None else described(worst)
-    return f"Repeat {run} with another gap, to separate instrument and fluid."
+    sizes = {record.name: by_run.get(record.name, float(record.errors[-1])) for record in own}
+    worst = max(own, key=lambda record: sizes[record.name])
+    run = f"{described(worst)} with another gap: it fits worst"
+    size = words.percent_of(sizes[worst.name])
+    return f"Repeat {run} ({size}); what changes with the gap is the instrument's."
 
 
 def _telling_test(result: Any) -> str:

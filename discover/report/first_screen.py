@@ -25,8 +25,11 @@ _COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
 
 def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
-    if answer is None:
-        return None
+    return None if answer is None else _screen(answer, modes.at_use(answer))
+
+
+def _screen(written: Answer, answer: Answer) -> dict[str, Any]:
+    """Return what the page shows of an answer, and what it copies of it as it is written."""
     headline, quality = map(unbroken, sentences.first_lines(answer))
     symbols = [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
@@ -35,7 +38,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             if one.is_term:
                 symbols[i] = one.symbol.replace("σ", "τ")
                 headline = headline.replace(one.symbol, symbols[i])
-    ends, doubts = answer.range.rate_1_s, answer.suspects or sentences.worst_run(answer)
+    ends = answer.range.rate_1_s
+    doubts = answer.suspects or sentences.worst_run(answer) or answer.failed
     shifts = [
         (modes.degrees(at), words.significant(one, 3),
          modes.span((ends[0] / one, ends[1] / one)) if ends else "–")
@@ -48,9 +52,10 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "title": (answer.title or answer.instead.lower()).partition(":")[0],
         "headline": headline,
         "quality": quality,
-        "fitted": _fitted(answer),
+        "fitted": (fitted := _fitted(written, answer))[0],
+        "reference": fitted[1],
         "open": not (answer.title and answer.adequate is not False and not doubts),
-        "law": _typeset(answer),
+        "law": _typeset(written),
         "constants": [
             (symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
@@ -59,7 +64,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
         "suspected": sentences.SUSPECTED.lower() + clock,
         "expected": errors(answer) if answer.title else (),
-        "copies": (copies := _copies(answer) if answer.title else []),
+        "copies": (copies := _copies(written) if answer.title else []),
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "missing": _not_there(copies),
         "behind": unbroken(answer.alternative),
@@ -67,16 +72,15 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _fitted(answer: Answer) -> str:
-    """Return in which flows constants were fitted, where, and at which temperature times hold."""
-    if not any(one.ci95 for one in answer.constants):
-        return ""
-    at = f"; times are for {modes.reduced_to(answer)}" if answer.shift_factors else ""
-    for used, factor in answer.shift_factors.items():
-        if [*answer.range.by_temperature] == [used]:
-            there = modes.degrees(used)
-            at = f" at {there}{at}: {modes.scaled(factor)} for {there}"
-    return f" (fitted in {sentences.flows_of(answer.range.flows)}{at})"
+def _fitted(written: Answer, answer: Answer) -> tuple[str, str]:
+    """Return in which flows constants were fitted and where times hold, and times as written."""
+    flows = f"fitted in {sentences.flows_of(answer.range.flows)}"
+    if written is not answer and written.temperature_C is not None:
+        by = modes.scaled(answer.shift_factors[written.temperature_C]).replace(" by", " times by")
+        reference = f"For {modes.reduced_to(written)} (copies, tables below) {by}."
+        return f" at {modes.reduced_to(answer)} ({flows})", reference
+    at = f"; times are for {modes.reduced_to(answer)}" * bool(answer.shift_factors)
+    return f" ({flows}{at})" * any(one.ci95 is not None for one in answer.constants), ""
 
 
 def _said(one: Constant) -> str:

@@ -163,9 +163,10 @@ _EXPLAINED = {
     "unseen data": "what no fit used: runs left out, or another quantity of a run",
     "unseen runs": "runs that a fit did not use: held out, or left out in turn",
     "tolerance": "largest mean error above noise that is good enough: 5 % unless you set another",
-    "Passes": "mean error above noise is within the tolerance: 5 % unless you set another",
+    "Meets": "mean error above noise is within the tolerance: 5 % unless you set another",
+    "beyond it": "mean over runs of the root of squared error less squared noise",
 }
-_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|Passes)"
+_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|Meets|beyond it)"
 
 
 def explained(text: str) -> Markup:

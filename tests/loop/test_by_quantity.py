@@ -195,13 +195,13 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
 
 def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
     factor = StageParameter(0.52, (0.04, 0.79), "1")
-    again = "Measure sweep and runs on one rheometer filling: runs fit "
+    again = "Measure sweep and runs on one filling: the runs' "
     for name, what in (
         ("modulus_factor", "moduli"),
         ("relaxation_time_factor", "relaxation times"),
     ):
         assert what_to_measure_next(close(declared_parameters={name: factor})) == (
-            f"{again}{what} 0.52 (0.04–0.79) times the sweep's."
+            f"{again}{what} are 0.52 (0.04–0.79) times the sweep's."
         )
     # one next to one, within the tolerance of 10 %, one that is no value; and without a sweep
     others = [{"modulus_factor": replace(factor, ci95=ends)}
@@ -220,9 +220,9 @@ def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_f
     found = result([*FITTED, pulled])  # misses of 6 %, tolerance 5 %
     found.discrepancy["by_run"] = {"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4}
     told = what_to_measure_next(found)
-    assert (
-        told
-        == "Repeat the start-up at 1 1/s (fast) with another gap, to separate instrument and fluid."
+    assert told == (
+        "Repeat the start-up at 1 1/s (fast) with another gap: it fits worst (8 %); "
+        "what changes with the gap is the instrument's."
     )
     # a miss within the noise is none to look into
     assert what_to_measure_next(result(FITTED, noise_floor=0.1)).startswith("Measure N1")
@@ -387,6 +387,10 @@ def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():
     reversed_once = replace(wave, rate=np.array([1.0, 1.0, 1.0, -1.0, -1.0]))
     assert range_of([reversed_once]).tests == ("steps of rate",)
     assert not range_of([reversed_once]).oscillates
+    angle = np.linspace(0.0, 4.9, 50)
+    cycle = made("cycle", angle, np.sin(angle), 2.0 * np.cos(angle))  # turns once
+    assert not range_of([cycle]).tests
+    assert range_of([cycle]).oscillates
     turns = replace(wave, rate=np.array([2.0, 0.1, -2.0, 0.1, 2.0]))
     assert not range_of([turns]).tests
     assert range_of([turns]).rate_1_s == pytest.approx((2.0, 2.0))  # its amplitude

@@ -25,8 +25,8 @@ from tensor_library.law_terms import LawTerm
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
         "Linear PTT, ε = 0.82 (95 % CI 0.58–1.07), 2 modes. Misses the default 5 % tolerance: mean "
-        "error 6 % (95 % CI 4–7 %) on 2 unseen runs, worst run 8 %, corrected for stress gain. "
-        "If that suffices, use for σ12 only, 0.003–3 1/s."
+        "error 6 % (95 % CI 4–7 %) on 2 unseen runs, worst run 8 %, allowing for stress "
+        "gain in records. If that suffices, use for σ12 only, 0.003–3 1/s."
     )
     asked = replace(MELT, tolerance=0.03).headline  # by somebody
     assert "Misses your 3 % tolerance: mean error 6 %" in asked
@@ -49,10 +49,14 @@ def test_the_first_line_has_law_constants_error_and_range():
     said = "use for σ12 only, oscillatory shear at 1 rad/s, strain amplitude 0.1–0.8."
     assert said in replace(MELT, range=swings).headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None, tolerance=0.06)
-    passed = "Passes 2 unseen runs: error 6 % above noise (1 %), corrected for stress gain. Use"
+    passed = "Predicts 2 unseen runs within 6 % above the noise (1 %): 6 % beyond it, allowing for"
     assert passed in exact.headline
+    sure = {"sigma12": replace(MELT.expected_error["sigma12"], inside=0.005)}
+    assert (
+        "runs to the noise (1 %): 0.5 % beyond it" in replace(exact, expected_error=sure).headline
+    )
     exact = replace(exact, expected_error={})
-    assert "Fits within the noise of 1 %, corrected for" in exact.headline
+    assert "Fits within the noise of 1 %, allowing for" in exact.headline
     states = replace(exact, range=replace(MELT.range, steady=True)).headline
     assert "Fits the flow curve within the noise of 1 %" in states
     assert "Use for steady shear stress only" in states
@@ -89,7 +93,8 @@ def test_a_law_is_of_use_for_what_the_table_has_a_good_number_of(flows, errors, 
     n1 = "Do not rely on N1 until tested: equally good laws agree within 3 %, but all could be"
     assert (n1 in answer.headline) is (said == "σ12")
     # what is as good as was asked has no condition
-    assert f"met. Use for {said.removesuffix(' only')}" in headline(answer, tolerance=0.5)
+    good = headline(answer, tolerance=0.6)
+    assert f"met. Use for {said.removesuffix(' only')}" in good
     missed = {**errors, "sigma12": ExpectedError(0.6), "uniaxial": ExpectedError(0.6)}
     useless = replace(answer, expected_error=missed, range=MELT.range)
     # a stress that is missed by more than a quarter is of no use, whatever the mean
@@ -98,13 +103,15 @@ def test_a_law_is_of_use_for_what_the_table_has_a_good_number_of(flows, errors, 
 
 def test_what_errors_allow_for_in_the_instrument_is_said_with_them():
     none = replace(MELT, suspects=())
-    assert "corrected" not in none.headline
+    assert "allowing" not in none.headline
     two = replace(MELT, suspects=(*MELT.suspects, Suspect("wall_slip")))
-    assert "corrected for stress gain and wall slip. " in two.headline
+    assert "allowing for stress gain and wall slip in records. " in two.headline
     many = replace(two, suspects=(*two.suspects, Suspect("edge_fracture")))
-    assert "corrected for 3 measurement errors. " in many.headline
+    assert "allowing for 3 measurement errors. " in many.headline
     slow = Suspect("rate_rise_time", (Constant("tau", 0.02, (0.01, 0.03), "s"),))
-    assert "corrected for motor response time. " in replace(MELT, suspects=(slow,)).headline
+    assert (
+        "allowing for motor response time in records. " in replace(MELT, suspects=(slow,)).headline
+    )
 
 
 def test_shifted_runs_have_their_range_at_the_temperatures_of_the_measurement():
@@ -298,14 +305,13 @@ def test_a_maxwell_fluid_with_a_structure_is_thixotropic_only_where_runs_show_re
 def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_has_the_worst_run():
     errors = {**MELT.expected_error, "uniaxial": ExpectedError(0.17, note="unseen runs")}
     told = replace(MELT, expected_error=errors).headline
-    assert (
-        "data: σ12 6 % (worst run 8 %, corrected for stress gain), uniaxial extension 17 %." in told
-    )
+    own = "allowing for stress gain in records"
+    assert f"data: σ12 6 % (worst run 8 %, {own}), uniaxial extension 17 %." in told
+    mixed = replace(MELT, expected_error=errors, tolerance=0.1).headline
+    assert f"Meets 10 % on unseen data for σ12 (6 %, {own}), not for uniaxial extension" in mixed
     both = replace(MELT.range, flows=("shear", "uniaxial"))  # the worst may be either
     told = replace(MELT, expected_error=errors, range=both).headline
-    assert (
-        "data: σ12 6 % (corrected for stress gain), uniaxial extension 17 %, worst run 8 %." in told
-    )
+    assert f"data: σ12 6 % ({own}), uniaxial extension 17 %, worst run 8 %." in told
     # not of what the law alone says, nor of fitted runs
     for other in ({"is_measured": False}, {"is_residual": True}):
         same = {**errors, "uniaxial": replace(errors["uniaxial"], **other)}
