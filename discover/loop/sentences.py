@@ -214,10 +214,11 @@ def _by_geometry(result: Any) -> str:
     by_run = (result.discrepancy or {}).get("by_run", {})
     own = _sheared(result) or [record for record in result.records if not record.held_out]
     sizes = {record.name: by_run.get(record.name, float(record.errors[-1])) for record in own}
-    worst = max(own, key=lambda record: sizes[record.name])
-    run = f"{described(worst)} with another gap: it fits worst"
-    size = words.percent_of(sizes[worst.name])
-    return f"Repeat {run} ({size}); what changes with the gap is the instrument's."
+    worst = max(own, key=lambda record: sizes[record.name], default=None)
+    run, why = "one run", ""
+    if worst is not None:
+        run, why = described(worst), f"it fits worst ({words.percent_of(sizes[worst.name])}); "
+    return f"Repeat {run} with another gap: {why}what changes with the gap is the instrument's."
 
 
 def _telling_test(result: Any) -> str:
