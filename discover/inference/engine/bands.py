@@ -120,13 +120,9 @@ class Predictions:
         return np.stack([np.all(fine[:, self.rows.run == i], axis=1) for i in runs], axis=1)
 
     def _moved(self, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return constants, moduli, and what is linear: the likeliest, then of steps both ways.
-
-        A step is one standard deviation along each independent direction of what is uncertain.
-        """
-        assert fit.covariance is not None
-        steps = np.eye(len(fit.covariance))
-        thetas, linear = fit.drawn(np.concatenate([0.0 * steps[:1], steps, -steps]))
+        """Return constants, moduli, and what is linear: the likeliest, then of `credible_steps`."""
+        steps = credible_steps(self.posterior.fitter_of(fit), fit)
+        thetas, linear = fit.drawn(np.concatenate([0.0 * steps[:1], steps]))
         moduli = self.posterior.search.fitter.moduli_of(linear)
         if not self.as_recorded:
             thetas[:, self._of_bench] = self.problem.zero[self._of_bench]
@@ -145,10 +141,8 @@ class Predictions:
         """Return what a hypothesis predicts; two where N2 may be as it says, or anything."""
         thetas, moduli, linear = self._moved(fit)
         # what is linear in the records moves no prediction of the model
-        vectors = np.column_stack([thetas, moduli])
-        moved = np.append(True, np.any(vectors[1:] != vectors[0], axis=1))
-        place = np.where(moved, np.cumsum(moved) - 1, 0)
-        values = self._observed(thetas[moved], moduli[moved])[place]
+        own, place = _distinct(np.column_stack([thetas, moduli]))
+        values = self._observed(thetas[own], moduli[own])[place]
         sound = self._is_sound(values[..., 0])
         fitter = self.posterior.fitter_of(fit)
         if isinstance(fitter, WithFunction) and fitter.variable.slot == "network":
@@ -240,6 +234,38 @@ class Predictions:
         )
         low, middle, high = limits.reshape(3, -1, 3)
         return Band(middle, low, high)
+
+
+def credible_steps(fitter: Any, fit: Fit) -> Float[np.ndarray, "steps n"]:
+    """Return steps both ways along each independent direction of what is uncertain.
+
+    Of one standard deviation by Laplace's method, or as far as the fitted runs then change by one
+    of their noise: a constant that they do not tell at its likeliest value, they may tell far off.
+    """
+    if "steps" not in fit.memory:
+        assert fit.covariance is not None
+        steps = np.eye(len(fit.covariance))
+        steps = np.concatenate([steps, -steps])
+        thetas, linear = fit.drawn(steps)
+        own, place = _distinct(np.concatenate([fit.theta[None], thetas]))
+        predicted = fitter.predict(np.concatenate([fit.theta[None], thetas])[own])[place[1:]]
+        record = fitter.record(fit)
+        with np.errstate(all="ignore"):  # a law that runs away
+            off = (fitter.records(fit, predicted, linear) - record).T
+            white = fitter.noise.whitened(off, record, fit.noise)
+            far = np.nan_to_num(np.sqrt(np.sum(white**2, axis=0)), nan=_FAR, posinf=_FAR)
+        fit.memory["steps"] = steps / np.maximum(far, 1.0)[:, None]
+    return fit.memory["steps"]
+
+
+_FAR = 10.0
+"""Standard deviations that a step is taken for along which the law runs away."""
+
+
+def _distinct(vectors: Float[np.ndarray, "trials m"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return which vectors differ from the first, that itself too, and the place of each there."""
+    own = np.append(True, np.any(vectors[1:] != vectors[0], axis=1))
+    return own, np.where(own, np.cumsum(own) - 1, 0)
 
 
 def _factor(
