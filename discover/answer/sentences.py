@@ -134,9 +134,7 @@ def description(answer: Any, brief: int = 0) -> str:
     on = note if note.partition(" ")[2].startswith("unseen") else "unseen runs"
     if answer.fits_to_the_noise and most <= answer.tolerance:
         size, of = "≤ " * (len(each) > 1) + at_most(most), f" ({noise})" * bool(noise)
-        within = f"within {percent_of(answer.tolerance)} above"  # fits to the noise all the same
-        to = "to" if most <= (answer.noise or 0.0) else within
-        said = f"Predicts {on} {to} the noise{of}: {size} beyond it"
+        said = f"Predicts {on} to {size} above the noise{of}"
     elif answer.fits_to_the_noise:
         within = f"within the noise{f' of {noise}' * bool(noise)}"
         said = f"Fits {'the flow curve ' * answer.range.steady}{within}"
@@ -197,12 +195,12 @@ def _misses(answer: Any) -> bool:
 def _corrected(answer: Any, brief: int) -> str:
     """Return what of the instrument predictions of the records hold; empty where nothing."""
     names = [
-        f"{f'≤ {percent_of(one.correction)} ' * bool(one.correction)}{effect_title(one.effect)}"
+        f"{effect_title(one.effect)}{f' (≤ {percent_of(one.correction)})' * bool(one.correction)}"
         for one in answer.suspects[: None if brief < 5 else 0]
     ]
     few = len(names) <= (1 if brief else _MOST_SUSPECTS)
-    told = f"{listed(names)} in records" if few else f"{len(names)} measurement errors"
-    return f"allowing for {told}" if names else ""
+    told = listed(names) if few else f"{len(names)} measurement errors"
+    return f"with {told} fitted too" if names else ""
 
 
 _MOST_SUSPECTS, _OF_FITTED = 2, "Residual of the fitted runs"

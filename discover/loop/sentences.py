@@ -218,7 +218,7 @@ def _by_geometry(result: Any) -> str:
     run, why = "one run", ""
     if worst is not None:
         run, why = described(worst), f"it fits worst ({words.percent_of(sizes[worst.name])}); "
-    return f"Repeat {run} with another gap: {why}what changes with the gap is the instrument's."
+    return f"Repeat {run} with another gap: {why}if its misfit changes, suspect the instrument."
 
 
 def _telling_test(result: Any) -> str:

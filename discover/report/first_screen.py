@@ -77,7 +77,7 @@ def _fitted(written: Answer, answer: Answer) -> tuple[str, str]:
     flows = f"fitted in {sentences.flows_of(answer.range.flows)}"
     if written is not answer and written.temperature_C is not None:
         by = modes.scaled(answer.shift_factors[written.temperature_C]).replace(" by", " times by")
-        reference = f"For {modes.reduced_to(written)} (copies, tables below) {by}."
+        reference = f"Copies and tables further below are for {modes.reduced_to(written)}: {by}."
         return f" at {modes.reduced_to(answer)} ({flows})", reference
     at = f"; times are for {modes.reduced_to(answer)}" * bool(answer.shift_factors)
     return f" ({flows}{at})" * any(one.ci95 is not None for one in answer.constants), ""

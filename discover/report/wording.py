@@ -164,9 +164,9 @@ _EXPLAINED = {
     "unseen runs": "runs that a fit did not use: held out, or left out in turn",
     "tolerance": "largest mean error above noise that is good enough: 5 % unless you set another",
     "Meets": "mean error above noise is within the tolerance: 5 % unless you set another",
-    "beyond it": "mean over runs of the root of squared error less squared noise",
+    "above the noise": "mean over runs of the root of squared error less squared noise",
 }
-_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|Meets|beyond it)"
+_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|Meets|above the noise)"
 
 
 def explained(text: str) -> Markup:

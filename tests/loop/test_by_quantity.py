@@ -222,7 +222,7 @@ def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_f
     told = what_to_measure_next(found)
     assert told == (
         "Repeat the start-up at 1 1/s (fast) with another gap: it fits worst (8 %); "
-        "what changes with the gap is the instrument's."
+        "if its misfit changes, suspect the instrument."
     )
     # a miss within the noise is none to look into
     assert what_to_measure_next(result(FITTED, noise_floor=0.1)).startswith("Measure N1")

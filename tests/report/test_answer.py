@@ -25,8 +25,8 @@ from tensor_library.law_terms import LawTerm
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
         "Linear PTT, ε = 0.82 (95 % CI 0.58–1.07), 2 modes. Misses the default 5 % tolerance: mean "
-        "error 6 % (95 % CI 4–7 %) on 2 unseen runs, worst run 8 %, allowing for stress "
-        "gain in records. If that suffices, use for σ12 only, 0.003–3 1/s."
+        "error 6 % (95 % CI 4–7 %) on 2 unseen runs, worst run 8 %, with stress "
+        "gain fitted too. If that suffices, use for σ12 only, 0.003–3 1/s."
     )
     asked = replace(MELT, tolerance=0.03).headline  # by somebody
     assert "Misses your 3 % tolerance: mean error 6 %" in asked
@@ -49,14 +49,12 @@ def test_the_first_line_has_law_constants_error_and_range():
     said = "use for σ12 only, oscillatory shear at 1 rad/s, strain amplitude 0.1–0.8."
     assert said in replace(MELT, range=swings).headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None, tolerance=0.06)
-    passed = "Predicts 2 unseen runs within 6 % above the noise (1 %): 6 % beyond it, allowing for"
+    passed = "Predicts 2 unseen runs to 6 % above the noise (1 %), with stress gain fitted too."
     assert passed in exact.headline
     sure = {"sigma12": replace(MELT.expected_error["sigma12"], inside=0.005)}
-    assert (
-        "runs to the noise (1 %): 0.5 % beyond it" in replace(exact, expected_error=sure).headline
-    )
+    assert "runs to 0.5 % above the noise (1 %)" in replace(exact, expected_error=sure).headline
     exact = replace(exact, expected_error={})
-    assert "Fits within the noise of 1 %, allowing for" in exact.headline
+    assert "Fits within the noise of 1 %, with stress gain" in exact.headline
     states = replace(exact, range=replace(MELT.range, steady=True)).headline
     assert "Fits the flow curve within the noise of 1 %" in states
     assert "Use for steady shear stress only" in states
@@ -103,15 +101,13 @@ def test_a_law_is_of_use_for_what_the_table_has_a_good_number_of(flows, errors, 
 
 def test_what_errors_allow_for_in_the_instrument_is_said_with_them():
     none = replace(MELT, suspects=())
-    assert "allowing" not in none.headline
+    assert "fitted too" not in none.headline
     two = replace(MELT, suspects=(*MELT.suspects, Suspect("wall_slip")))
-    assert "allowing for stress gain and wall slip in records. " in two.headline
+    assert "with stress gain and wall slip fitted too. " in two.headline
     many = replace(two, suspects=(*two.suspects, Suspect("edge_fracture")))
-    assert "allowing for 3 measurement errors. " in many.headline
+    assert "with 3 measurement errors fitted too. " in many.headline
     slow = Suspect("rate_rise_time", (Constant("tau", 0.02, (0.01, 0.03), "s"),))
-    assert (
-        "allowing for motor response time in records. " in replace(MELT, suspects=(slow,)).headline
-    )
+    assert "with motor response time fitted too. " in replace(MELT, suspects=(slow,)).headline
 
 
 def test_shifted_runs_have_their_range_at_the_temperatures_of_the_measurement():
@@ -305,7 +301,7 @@ def test_a_maxwell_fluid_with_a_structure_is_thixotropic_only_where_runs_show_re
 def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_has_the_worst_run():
     errors = {**MELT.expected_error, "uniaxial": ExpectedError(0.17, note="unseen runs")}
     told = replace(MELT, expected_error=errors).headline
-    own = "allowing for stress gain in records"
+    own = "with stress gain fitted too"
     assert f"data: σ12 6 % (worst run 8 %, {own}), uniaxial extension 17 %." in told
     mixed = replace(MELT, expected_error=errors, tolerance=0.1).headline
     assert f"Meets 10 % on unseen data for σ12 (6 %, {own}), not for uniaxial extension" in mixed

@@ -167,7 +167,7 @@ def test_a_residual_of_fitted_runs_is_no_expected_error():
         discrepancy=Discrepancy(0.06, (0.06, 0.06)),
         expected_error={"sigma12": ExpectedError(0.06, is_residual=True)},
     )
-    assert "Residual of the fitted runs 6 %, allowing for" in fitted.headline
+    assert "Residual of the fitted runs 6 %, with stress gain fitted too" in fitted.headline
     page = page_of(fitted)
     assert "<th>residual of the fitted runs (noise 0.25\N{NO-BREAK SPACE}%)</th>" in page
     assert not any("Error on unseen" in line for line in fitted.lines)
@@ -237,7 +237,9 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     time = Constant("t", 1312.34, (1000.0, 1500.0), "s")
     told = screen_of(hot, constants=(time, Constant("k", 0.02, (0.01, 0.03), "1/s")))
     assert told["fitted"] == " at −10 °C (fitted in shear)"
-    assert told["reference"] == "For −35 °C (copies, tables below) multiply times by 131."
+    assert told["reference"] == (
+        "Copies and tables further below are for −35 °C: multiply times by 131."
+    )
     times = [row[2].split("\N{NO-BREAK SPACE}")[0] for row in told["constants"]]
     # 1312 s over 131, and 0.02 1/s times 131
     assert [float(re.split(r"[^\d.]", one)[0]) for one in times] == [10.0, 2.6]
