@@ -80,8 +80,8 @@ def unfitted_runs(dataset: Dataset, runs: Sequence[Run]) -> list[Run]:
     sound = {run.name: run.time for run in dataset.quantity_by_quantity()}
     found = [run.observing(quantity) for run in runs for quantity in run.beside]
     found = [one for one in found if one.name in sound.keys() - {run.name for run in runs}]
-    found = [one.window(np.isin(one.time, sound[one.name])) for one in found]
-    return [one for one in found if len(one) >= FEWEST_SAMPLES]
+    kept = [(one, np.isin(one.time, sound[one.name])) for one in found]
+    return [one.window(at) for one, at in kept if np.count_nonzero(at) >= FEWEST_SAMPLES]
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:

@@ -7,6 +7,7 @@ import pytest
 
 from discover.dataset import Dataset, Run
 from discover.loop import DeclaredModel, run_loop
+from discover.loop.runs import unfitted_runs
 from discover.protocols import start_up
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
@@ -52,3 +53,13 @@ def test_samples_of_n1_that_no_fluid_can_have_are_not_compared():
         first_normal_stress_difference=-run("", 1.2).first_normal_stress_difference,
     )
     assert [one.name for one in loop(right, negative).unfitted] == ["right (N1)"]
+
+
+def test_a_part_of_a_run_without_a_sound_sample_of_n1_is_not_compared():
+    whole = run("late", 1.2)
+    early = np.where(TIMES < 3.0, -1.0, 1.0) * whole.first_normal_stress_difference
+    whole = replace(whole, first_normal_stress_difference=early)
+    data = Dataset("made", (run("right", 0.6), whole))
+    assert unfitted_runs(data, [whole.window(TIMES < 1.0)]) == []
+    (kept,) = unfitted_runs(data, [whole])  # control: of the whole run the later part is
+    assert 2.0 < kept.time[0] < 4.0
