@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -23,8 +24,6 @@ from tensor_library import LawTerms, TermLibrary, parse_term
 
 STRAIN_STEP = 0.1
 """Largest strain of a step."""
-
-_SHEAR: FlowKind = "shear"
 
 
 def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary:
@@ -205,7 +204,7 @@ def separations(
     times = np.linspace(0.0, _DURATION, 161)
     runs = [bare_run(in_flow(start_up(rate), kind), times) for kind, rate in starts]
     extension = stresses_of_laws(library, laws, runs, base, strain_step=np.inf)
-    flows: list[tuple[FlowKind, str]] = [(_SHEAR, name) for name in ordinary_flows()]
+    flows: list[tuple[Any, str]] = [("shear", name) for name in ordinary_flows()]
     flows += [(kind, f"{kind} extension at a rate of {rate:g}") for kind, rate in starts]
     shear = stresses[:, len(random_histories()) :]
     reference, *others = ([*a, *b] for a, b in zip(shear, extension, strict=True))
