@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.learners.tbnn_ude.session import initial_law
-from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
+from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian, weights_of
 
 
 def nearly_giesekus(mobility):
@@ -25,7 +25,8 @@ def told_as_differences(problem, law, step, tolerance):
 
     `step`: of the weights along a random direction. `tolerance`: of the largest difference.
     """
-    rebuild = Rebuild.everything(law)
+    n = len(weights_of(law))  # all of them
+    rebuild = Rebuild(law, jnp.arange(n), jnp.ones(n, bool), jnp.ones(n))
     along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
     direction = jax.random.normal(jax.random.key(2), rebuild.start.shape)
     moved = (rebuild.start + s * direction for s in (step, -step))

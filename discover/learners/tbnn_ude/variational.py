@@ -77,12 +77,6 @@ class Rebuild(eqx.Module):
     scale: Float[Array, " q"]  # size of each entry's unit, shape (q,)
 
     @classmethod
-    def everything(cls, law: TensorBasisNetwork) -> "Rebuild":
-        """Return the vector of all trainable numbers."""
-        n = _count_of(law)
-        return cls(law, jnp.arange(n), jnp.ones(n, bool), jnp.ones(n))
-
-    @classmethod
     def of_constants(
         cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
     ) -> "Rebuild":
