@@ -5,28 +5,29 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.of_fluids import bare_run
 from discover.inference.engine import Posterior
-from discover.inference.engine.bands import SIMPLE_FLUIDS
+from discover.inference.engine.bands import Predictions
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import TERM_ODDS
+from discover.inference.engine.rows import Rows
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
 from discover.protocols import in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
-from discover.statistics.noise.noise_model import rms
 
-_LAWS, _DRAWS = 20, 4
+_LAWS = 20
+_MOST_OF_THEM = 0.5  # Share of laws that a flow must leave
 # Of the runs, as which they count where laws are weighed that were fitted to them and are all
 # wrong: on development seeds with one and less, bands of N1 hold 92 and 98 % of the samples
 _TEMPERED = 0.5
 _SAMPLES = 81
 _STRAIN, _HENCKY = 20.0, 3.0
 _LEAST_LIKELY = 0.01  # Of the likeliest law, below which one changes nothing
-_SEED = 20261128
 
 _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
 
@@ -55,71 +56,50 @@ class Spread:
 def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     """Return by how much σ12, N1, N2 and uniaxial stress differ between equally good laws.
 
-    These are `weighed_laws`. `best`: the law that is reported, from which differences are counted.
+    These are `weighed_laws`, of the fluid alone, with what is uncertain of their constants. `best`:
+    the law that is reported, from which differences are counted.
     """
-    runs = posterior.problem.fitted.runs
-    weighed = weighed_laws(posterior)
+    runs, weighed = posterior.problem.fitted.runs, weighed_laws(posterior)
     rates = [float(np.max(np.abs(run.rate))) for run in runs]
     rates = [rate for rate in rates if rate > 0.0]
     if not weighed or not rates or best.covariance is None:
         return {}
-    lot = np.random.default_rng(_SEED)
-    thetas, weights = [best.theta], []
-    for fit, weight in weighed:
-        assert fit.covariance is not None
-        thetas += [*fit.drawn(lot.standard_normal((_DRAWS, len(fit.covariance))))[0]]
-        weights += [weight / _DRAWS] * _DRAWS
-    inside = _flows_inside(runs, rates)
-    sheared = [*inside, _start_up(BEYOND * max(rates), _STRAIN)]
-    pulled = []
-    for rate in (max(rates), BEYOND * max(rates)):
-        flow = in_flow(start_up(rate), "uniaxial")
-        pulled.append(bare_run(flow, np.linspace(0.0, _HENCKY / rate, _SAMPLES)))
-    model, vectors = posterior.problem.model, np.array(thetas)
-    with np.errstate(all="ignore"):
-        in_shear = model.observables(vectors, make_batch(sheared))
-        in_extension = model.predictions(vectors, make_batch(pulled))
-    seen = [
-        (kind, "inside" if i < len(inside) else "beyond", in_shear[:, i, : len(test), k])
-        for i, test in enumerate(sheared)
-        for k, kind in enumerate(_SHEAR)
-    ]
-    ends = zip(("inside", "beyond"), np.moveaxis(in_extension, 1, 0), strict=True)
-    seen += [("uniaxial", place, found) for place, found in ends]
-    own: dict[str, dict[str, list[float]]] = {}
-    ratios, stress = [], {}
-    for i, (kind, place, found) in enumerate(seen):
-        of_n1 = seen[i - 1][2] if kind == "N2" else found
-        with np.errstate(all="ignore"):  # laws that diverge in this flow
-            size = rms(of_n1[0])
-            if place == "inside":
-                stress[kind] = rms(found[0])
-            if kind == "N2" and place == "inside":
-                over = float(np.copysign(rms(found[0]), found[0] @ of_n1[0])) / size
-                ratios.append((over, float(np.max(np.abs(inside[i // len(_SHEAR)].rate)))))
-            squares = np.mean((found[1:] - found[0]) ** 2, axis=1)
-        sound = np.isfinite(squares)
-        share = np.array(weights) * sound
-        if np.sum(share) < 0.5 or not np.isfinite(size) or size == 0.0:
-            value = np.nan
-        else:
-            square = float(share[sound] @ squares[sound]) / float(np.sum(share))
-            value = float(np.sqrt(square)) / size
-            if kind == "N2" and posterior.problem.leaves_second_difference_open(best.names):
-                value = max(value, abs(SIMPLE_FLUIDS) / 12.0**0.5)  # anything from that to zero
-        own.setdefault(kind, {}).setdefault(place, []).append(value)
-    known = bool(np.all(np.isfinite(ratios)))
-    ratio, at = max(ratios, key=lambda one: abs(one[0])) if known else (None, None)
+    inside, ends = _flows_inside(runs, rates), (max(rates), BEYOND * max(rates))
+    n, flows = len(inside), [*inside, _start_up(ends[1], _STRAIN), *map(_uniaxial, ends)]
+    predictions = Predictions(posterior, Rows.of(flows), as_recorded=False)
+    reported, laws = predictions.of_laws([(best, 1.0)])[0], predictions.of_laws(weighed)
+    found = []
+    with np.errstate(all="ignore"):  # of extension there is no N1
+        for i in range(len(flows)):
+            at = predictions.rows.run == i
+            own = np.where(reported.sound[i], reported.middle[at], np.nan)
+            kept = [law for law in laws if law.sound[i]]
+            share = sum(law.weight for law in kept)
+            squares = [
+                law.weight * ((law.middle[at] - own) ** 2 + law.variance[at]) for law in kept
+            ]
+            square = np.mean(sum(squares, np.zeros_like(own)), axis=0) / share
+            size = np.sqrt(np.mean(own**2, axis=0))
+            over_n1 = np.copysign(size[2], own[:, 1] @ own[:, 2]) / size[1]
+            apart = np.sqrt(square) / size[[0, 1, 1]] if share >= _MOST_OF_THEM else np.nan * size
+            found.append((size, apart, over_n1))
+    size, apart, ratios = (np.array(each) for each in zip(*found, strict=True))
+    falls = falls_above(posterior.problem.model, best.theta, rates)
+    at = int(np.argmax(np.abs(ratios[:n])))  # one that is not finite first
+    over_n1 = _largest(ratios[[at]])
+    rate = None if over_n1 is None else float(np.max(np.abs(inside[at].rate)))
+    columns = [(kind, apart[:n, k], apart[n, k], size[n - 1, k]) for k, kind in enumerate(_SHEAR)]
+    columns.append(("uniaxial", apart[n + 1, 0], apart[n + 2, 0], size[n + 1, 0]))
     return {
         kind: Spread(
-            _largest(of["inside"]),
-            _largest(of["beyond"]),
-            ratio if kind == "N2" else None,
-            _largest([stress[kind]]),
-            falls_above(model, best.theta, rates) if kind == "sigma12" else None,
-            at if kind == "N2" else None,
+            _largest(within),
+            _largest(beyond),
+            over_n1 if kind == "N2" else None,
+            _largest(stress),
+            falls if kind == "sigma12" else None,
+            rate if kind == "N2" else None,
         )
-        for kind, of in own.items()
+        for kind, within, beyond, stress in columns
     }
 
 
@@ -147,7 +127,7 @@ def falls_above(
 _CURVE, _STEADY, _ROUNDING = 33, 100.0, 1e-3
 
 
-def _largest(values: Sequence[float]) -> float | None:
+def _largest(values: ArrayLike) -> float | None:
     return float(np.max(values)) if np.all(np.isfinite(values)) else None
 
 
@@ -205,3 +185,8 @@ def _thinned(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
 
 def _start_up(rate: float, strain: float) -> Run:
     return bare_run(start_up(rate), np.linspace(0.0, strain / rate, _SAMPLES))
+
+
+def _uniaxial(rate: float) -> Run:
+    flow = in_flow(start_up(rate), "uniaxial")
+    return bare_run(flow, np.linspace(0.0, _HENCKY / rate, _SAMPLES))

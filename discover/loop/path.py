@@ -11,7 +11,6 @@ from scipy.special import logsumexp
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.inference.engine import Indistinguishable, Posterior
-from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeForm
 from discover.inference.engine.rows import Rows
@@ -166,10 +165,10 @@ class Path:
         """All runs with the predictions of every stage, bands, and those of each explanation."""
         problem, found = self.posterior.problem, []
         fits = [self.fitted(one.members[0]) for one in self._listed]
-        bands = self.posterior.bands()
         for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
             if rows is None:
                 continue
+            bands = self.posterior.bands(rows)
             steps = [*self.path[1:-1], self.fit] if self.fit.names else []
             stages = [self.predicted(fit, rows, held_out) for fit in steps]
             models = np.stack([self.declared_predicted(rows), *stages])
@@ -177,35 +176,11 @@ class Path:
             each = [self.predicted(fit, rows, held_out) for fit in fits]
             for i, record in enumerate(records):
                 n = len(record.time)
-                if held_out:
-                    own = bands[i]
-                    band = None if own is None else np.stack([own.low, own.high])[..., 0]
-                else:
-                    band = self._fitted_bands[:, rows.run == i]
+                own = bands[i]
+                band = None if own is None else np.stack([own.low, own.high])[..., 0]
                 own = np.stack([one[i, :n] for one in each]) if each else None
                 found.append(replace(record, band=band, by_explanation=own))
         return found
-
-    @cached_property
-    def _fitted_bands(self) -> Float[np.ndarray, "2 rows"]:
-        """Where 95 % of repeated measurements of the fitted runs should lie."""
-        fitter = self.posterior.search.fitter
-        weights, middles, variances = [], [], []
-        for fit, weight in self.posterior.relied_on or ((self.fit, 1.0),):
-            record = self.posterior.fitter_of(fit).record(fit)
-            assert fit.jacobian is not None
-            assert fit.covariance is not None
-            noise = fit.noise.sizes[fitter.rows.run] * fitter.noise.deviation(
-                record, fit.noise.share
-            )
-            spread = np.einsum("ij,jk,ik->i", fit.jacobian, fit.covariance, fit.jacobian)
-            weights.append(weight)
-            middles.append(record)
-            variances.append(spread + noise**2)
-        ends = quantiles(
-            np.array(weights), np.array(middles), np.array(variances), (0.025, 0.975)
-        )  # fmt: skip
-        return np.stack(ends)
 
     @cached_property
     def _listed(self) -> tuple[Indistinguishable, ...]:

@@ -56,6 +56,6 @@ def test_a_zero_that_runs_have_in_common_is_expected_of_the_next_one_too(signs, 
     (ahead,) = start_ups([0.0], (1.1,))
     fitted = start_ups(zero * np.array(signs, float), rates)
     posterior = explain(Problem(DeclaredModel.maxwell([1.0], [1.0]), [], fitted, [ahead]))
-    (band,) = posterior.bands()
+    (band,) = posterior.bands(posterior.problem.predicted)
     truth = 1.1 * (1.0 - np.exp(-TIMES))
     assert least * zero < np.mean(band.middle[:, 0] - truth) < most * zero

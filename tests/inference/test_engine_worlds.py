@@ -62,7 +62,7 @@ def test_among_all_candidates_the_verdicts_are_those_among_a_few(tmp_path):
 
 def inside(posterior, problem):
     """Return the share of samples that no fit saw in the bands of their runs."""
-    rows, bands = problem.predicted, posterior.bands()
+    rows, bands = problem.predicted, posterior.bands(problem.predicted)
     low, high = (np.concatenate([getattr(b, end)[:, 0] for b in bands]) for end in ("low", "high"))
     return np.mean((low <= rows.recorded) & (rows.recorded <= high)), np.mean(high - low)
 

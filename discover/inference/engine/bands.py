@@ -55,7 +55,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """What one hypothesis predicts of rows, and in which runs it does not run away."""
 
     weight: float
@@ -87,14 +87,18 @@ class Predictions:
         there is: every stress is then missed as runs left out are, more beyond the fastest rate,
         and N2 is as likely anything from −2/7 N1 to zero.
         """
-        parts = [*self._of_fits, *self._of_laws(of_none, self.posterior.unexplained, True)]
+        parts = [*self._of_fits, *self.of_laws(of_none, self.posterior.unexplained, True)]
         return [self._band(parts, i) for i in range(len(self.rows.runs))]
 
     @cached_property
-    def _of_fits(self) -> list[_Part]:
-        return self._of_laws(self.posterior.fits, 1.0 - self.posterior.unexplained, False)
+    def _of_fits(self) -> list[Part]:
+        return self.of_laws(self.posterior.fits, 1.0 - self.posterior.unexplained)
 
-    def _of_laws(self, laws: Laws, share: float, are_none: bool) -> list[_Part]:
+    def of_laws(self, laws: Laws, share: float = 1.0, are_none: bool = False) -> list[Part]:
+        """Return what laws predict, those of any weight; two of one that leaves N2 open.
+
+        `share`: of all of them. `are_none`: whether none of them is all there is.
+        """
         likely = ((f, share * p) for f, p in laws if f.covariance is not None)
         some = [(f, weight) for f, weight in likely if weight > _LEAST]
         return [part for fit, weight in some for part in self._parts(fit, weight, are_none)]
@@ -119,15 +123,6 @@ class Predictions:
         runs = range(len(self.rows.runs))
         return np.stack([np.all(fine[:, self.rows.run == i], axis=1) for i in runs], axis=1)
 
-    def _moved(self, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return constants, moduli, and what is linear: the likeliest, then of `credible_steps`."""
-        steps = credible_steps(self.posterior.fitter_of(fit), fit)
-        thetas, linear = fit.drawn(np.concatenate([0.0 * steps[:1], steps]))
-        moduli = self.posterior.search.fitter.moduli_of(linear)
-        if not self.as_recorded:
-            thetas[:, self._of_bench] = self.problem.zero[self._of_bench]
-        return thetas, moduli, linear
-
     @property
     def _of_bench(self) -> list[int]:
         """Positions of constants of the instrument, of the clock too where it is not fitted."""
@@ -137,11 +132,13 @@ class Predictions:
         at = [place for name in names for place in model.positions(name)]
         return at if 1 in self.problem.declared.free_positions else [1, *at]
 
-    def _parts(self, fit: Fit, weight: float, is_none: bool) -> list[_Part]:
+    def _parts(self, fit: Fit, weight: float, is_none: bool) -> list[Part]:
         """Return what a hypothesis predicts; two where N2 may be as it says, or anything."""
-        thetas, moduli, linear = self._moved(fit)
+        weights, thetas, moduli, linear = moved(self.posterior, fit)
+        if not self.as_recorded:
+            thetas[:, self._of_bench] = self.problem.zero[self._of_bench]
         # what is linear in the records moves no prediction of the model
-        own, place = _distinct(np.column_stack([thetas, moduli]))
+        own, place = distinct(np.column_stack([thetas, moduli]))
         values = self._observed(thetas[own], moduli[own])[place]
         sound = self._is_sound(values[..., 0])
         fitter = self.posterior.fitter_of(fit)
@@ -154,7 +151,7 @@ class Predictions:
             values[..., 0], apart = self._read(fitter, values[..., 0], fit, linear)
         middle, off = values[0], values[1:] - values[0]
         ways = np.nan_to_num(np.where(sound[1:, self.rows.run, None], off, 0.0))
-        variance = 0.5 * np.sum(ways**2, axis=0)
+        variance = np.tensordot(weights, ways**2, axes=1)
         size = self._sizes(middle)
         variance[:, 0] += apart
         if self.noise:
@@ -164,14 +161,14 @@ class Predictions:
             missed, (share, least) = self._missed(fit)[:, None], _UNRELATED
             off = (missed * _POWERS) ** 2 + np.maximum(missed * share, least) ** 2
             variance = variance + off * size**2
-        found = _Part(weight, middle, variance, sound[0])
+        found = Part(weight, middle, variance, sound[0])
         if not (is_none or self.problem.leaves_second_difference_open(fit.names)):
             return [found]
         prior, wide = middle.copy(), variance.copy()
         prior[:, 2] = 0.5 * SIMPLE_FLUIDS * middle[:, 1]
         wide[:, 2] += (SIMPLE_FLUIDS * middle[:, 1]) ** 2 / 12.0
         halves = (middle, variance), (prior, wide)
-        return [_Part(0.5 * weight, *half, sound[0]) for half in halves]
+        return [Part(0.5 * weight, *half, sound[0]) for half in halves]
 
     def _read(
         self,
@@ -218,7 +215,7 @@ class Predictions:
         beyond = np.maximum(self.rows.fastest / fastest, 1.0)
         return np.minimum(size * beyond, MOST_MISSED)[self.rows.run]
 
-    def _band(self, parts: Sequence[_Part], run: int) -> Band | None:
+    def _band(self, parts: Sequence[Part], run: int) -> Band | None:
         """Return the mixture in one run of the hypotheses that can be followed there."""
         at, some = self.rows.run == run, [part for part in parts if part.sound[run]]
         kept, total = (sum(part.weight for part in one) for one in (some, parts))
@@ -236,25 +233,39 @@ class Predictions:
         return Band(middle, low, high)
 
 
-def credible_steps(fitter: Any, fit: Fit) -> Float[np.ndarray, "steps n"]:
-    """Return steps both ways along each independent direction of what is uncertain.
+def moved(posterior: Any, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return weights of `credible_steps`, and constants, moduli, what is linear: before, by each.
+
+    Weighted squares of what the steps change add up to a variance.
+    """
+    steps, weights = credible_steps(posterior.fitter_of(fit), fit)
+    thetas, linear = fit.drawn(np.concatenate([0.0 * steps[:1], steps]))
+    return weights, thetas, posterior.search.fitter.moduli_of(linear), linear
+
+
+def credible_steps(
+    fitter: Any, fit: Fit
+) -> tuple[Float[np.ndarray, "steps n"], Float[np.ndarray, " steps"]]:
+    """Return steps along each independent direction of what is uncertain, and their weights.
 
     Of one standard deviation by Laplace's method, or as far as the fitted runs then change by one
     of their noise: a constant that they do not tell at its likeliest value, they may tell far off.
+    Both ways along what moves constants, half each, and one way along what is linear alone.
     """
     if "steps" not in fit.memory:
         assert fit.covariance is not None
-        steps = np.eye(len(fit.covariance))
-        steps = np.concatenate([steps, -steps])
+        n, free = len(fit.covariance), len(fit.priors)
+        steps = np.concatenate([np.eye(n), -np.eye(n)[:free]])
         thetas, linear = fit.drawn(steps)
-        own, place = _distinct(np.concatenate([fit.theta[None], thetas]))
+        own, place = distinct(np.concatenate([fit.theta[None], thetas]))
         predicted = fitter.predict(np.concatenate([fit.theta[None], thetas])[own])[place[1:]]
         record = fitter.record(fit)
         with np.errstate(all="ignore"):  # a law that runs away
             off = (fitter.records(fit, predicted, linear) - record).T
             white = fitter.noise.whitened(off, record, fit.noise)
             far = np.nan_to_num(np.sqrt(np.sum(white**2, axis=0)), nan=_FAR, posinf=_FAR)
-        fit.memory["steps"] = steps / np.maximum(far, 1.0)[:, None]
+        both = np.any(steps[:, :free], axis=1)
+        fit.memory["steps"] = steps / np.maximum(far, 1.0)[:, None], np.where(both, 0.5, 1.0)
     return fit.memory["steps"]
 
 
@@ -262,7 +273,7 @@ _FAR = 10.0
 """Standard deviations that a step is taken for along which the law runs away."""
 
 
-def _distinct(vectors: Float[np.ndarray, "trials m"]) -> tuple[np.ndarray, np.ndarray]:
+def distinct(vectors: Float[np.ndarray, "trials m"]) -> tuple[np.ndarray, np.ndarray]:
     """Return which vectors differ from the first, that itself too, and the place of each there."""
     own = np.append(True, np.any(vectors[1:] != vectors[0], axis=1))
     return own, np.where(own, np.cumsum(own) - 1, 0)

@@ -24,6 +24,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.forward import make_batch
 from discover.forward.of_fluids import bare_run
+from discover.inference.engine.bands import distinct, moved
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.posterior import Posterior
 from discover.protocols import (
@@ -237,16 +238,16 @@ def design(posterior: Posterior) -> NextTests:
         return NextTests()
     problem, share = posterior.problem, np.array([p for _, p in weighed])
     share = share / np.sum(share)
-    varied = [_varied(fit) for fit, _ in weighed]
+    varied = [_Varied.of(posterior, fit) for fit, _ in weighed]
     best, runs = weighed[0][0], problem.fitted.runs
     noise = max(best.noise.common, posterior.search.fitter.misfit(best))
     fresh = (1.0 - best.noise.correlation) / (1.0 + best.noise.correlation)
     longest = float(np.max(np.asarray(problem.declared.relaxation_time)))
     tests = possible_tests(runs, longest)
 
-    def weigh(tests: Sequence[Run], thetas: Sequence[Sequence[np.ndarray]]):
-        for test, predicted in zip(tests, _predicted(posterior, thetas, tests), strict=True):
-            one = _expected_of(test, predicted, share, noise, fresh, problem.loading)
+    def weigh(tests: Sequence[Run], varied: Sequence[_Varied]) -> Iterator[NextTest]:
+        for test, predicted in zip(tests, _predicted(posterior, varied, tests), strict=True):
+            one = _expected_of(test, predicted, varied, share, noise, fresh, problem.loading)
             if one is not None:
                 yield one
 
@@ -256,7 +257,7 @@ def design(posterior: Posterior) -> NextTests:
         fastest = max(kept, key=lambda run: float(np.max(np.abs(run.rate))))
         for title, changed in _elsewhere(posterior):
             again = replace(fastest, name=f"{fastest.name} again, {title}")
-            found += weigh([again], [[changed(theta) for theta in some] for some in varied])
+            found += weigh([again], [replace(v, thetas=changed(v.thetas)) for v in varied])
     found.sort(key=lambda one: -round(one.nats, 2))  # the simplest first among equals
     names = tuple(fit.names for fit, _ in weighed)
     return NextTests(names, tuple(map(float, share)), noise, tuple(found))
@@ -269,24 +270,36 @@ def _contenders(posterior: Posterior) -> list[tuple[Fit, float]]:
     return [pair for pair in found if pair[1] >= _LEAST_LIKELY * found[0][1]]
 
 
-def _varied(fit: Fit) -> list[Float[np.ndarray, " p"]]:
-    """Return the constants of a fit, and each combination of them that varies by itself."""
-    assert fit.covariance is not None
-    n = len(fit.priors)
-    root = np.linalg.cholesky(fit.covariance[:n, :n])
-    return [fit.theta, *(fit.at(fit.coordinates + column) for column in root.T)]
+@dataclass(frozen=True)
+class _Varied:
+    """Constants and moduli of a fit, then those moved by `credible_steps` with their weights."""
+
+    weights: Float[np.ndarray, " steps"]
+    thetas: Float[np.ndarray, "varied p"]
+    moduli: Float[np.ndarray, "varied c"]
+
+    @classmethod
+    def of(cls, posterior: Posterior, fit: Fit) -> "_Varied":
+        weights, thetas, moduli, _ = moved(posterior, fit)
+        own, _ = distinct(np.column_stack([thetas, moduli]))
+        return cls(weights[own[1:]], thetas[own], moduli[own])
+
+    def factor(self, group: Float[np.ndarray, "varied n"]) -> Float[np.ndarray, "k n"]:
+        """Return F with FᵀF the covariance of a prediction, of it and its variations."""
+        sound = np.all(np.isfinite(group[1:]), axis=1)
+        return (np.sqrt(self.weights)[:, None] * (group[1:] - group[0]))[sound]
 
 
 def _predicted(
-    posterior: Posterior, thetas: Sequence[Sequence[np.ndarray]], tests: Sequence[Run]
+    posterior: Posterior, varied: Sequence[_Varied], tests: Sequence[Run]
 ) -> Iterator[list[Float[np.ndarray, "_ n"]]]:
     """Return what each hypothesis predicts of each test, with its variations."""
     if not tests:
         return
-    flat = np.array([theta for some in thetas for theta in some])
-    ends = np.cumsum([len(some) for some in thetas])[:-1]
+    thetas, moduli = (np.concatenate([getattr(v, n) for v in varied]) for n in ("thetas", "moduli"))
+    ends = np.cumsum([len(one.thetas) for one in varied])[:-1]
     with np.errstate(all="ignore"):
-        found = posterior.problem.model.predictions(flat, make_batch(tests))
+        found = posterior.problem.model.predictions(thetas, make_batch(tests), moduli)
     for i, test in enumerate(tests):
         yield np.split(found[:, i, : len(test)], ends)
 
@@ -304,14 +317,14 @@ def _elsewhere(
         for p in model.positions(name)
     ]  # fmt: skip
 
-    def half(theta: np.ndarray) -> np.ndarray:
-        changed = theta.copy()
-        changed[by_gap] *= 2.0
+    def half(thetas: np.ndarray) -> np.ndarray:
+        changed = thetas.copy()
+        changed[:, by_gap] *= 2.0
         return changed
 
-    def other(theta: np.ndarray) -> np.ndarray:
-        changed = theta.copy()
-        changed[outside] = zero[outside]
+    def other(thetas: np.ndarray) -> np.ndarray:
+        changed = thetas.copy()
+        changed[:, outside] = zero[outside]
         return changed
 
     if by_gap:
@@ -323,6 +336,7 @@ def _elsewhere(
 def _expected_of(
     test: Run,
     predicted: Sequence[Float[np.ndarray, "_ n"]],
+    varied: Sequence[_Varied],
     share: Float[np.ndarray, " e"],
     noise: float,
     fresh: float,
@@ -338,7 +352,7 @@ def _expected_of(
     is_flow_curve = test.protocol.control == "steady"
     size = np.abs(curves[0]) if is_flow_curve else rms(curves[0])
     scale = np.maximum(noise * size, np.finfo(float).tiny) / np.sqrt(fresh)
-    factors = [_factor(of / scale) for of in predicted]
+    factors = [one.factor(of / scale) for one, of in zip(varied, predicted, strict=True)]
     count = len(curves)
     evidence = np.zeros((count, count))
     for i in range(count):
@@ -351,9 +365,3 @@ def _expected_of(
     nats = float(-share @ np.log(np.exp(-0.25 * evidence) @ share))
     samples = test.rate if is_flow_curve else test.time
     return NextTest(test.name, test.quantity, nats, evidence, samples, curves, is_flow_curve)
-
-
-def _factor(group: Float[np.ndarray, "varied n"]) -> Float[np.ndarray, "k n"]:
-    """Return F with FᵀF the covariance of a prediction; the prediction itself comes first."""
-    varied = group[1:][np.all(np.isfinite(group[1:]), axis=1)]
-    return varied - group[0]

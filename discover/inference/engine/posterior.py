@@ -213,11 +213,8 @@ class Posterior:
         return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - fit.noise.common**2, 0.0))
 
     @in_one_thread
-    def bands(self) -> list[Band | None]:
-        """Return the bands of the predicted runs with their noise, by the fitted runs alone."""
-        rows = self.problem.predicted
-        if rows is None:
-            return []
+    def bands(self, rows: Rows) -> list[Band | None]:
+        """Return the bands of runs with their noise, by the fitted runs alone."""
         return Predictions(self, rows, noise=True).bands(self.predicting_best)
 
 
