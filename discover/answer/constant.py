@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from discover.effects.base import POWERS_OF_TIME
 from discover.equations.spelling.plain_signs import plain as plain_signs
 from discover.words import LEVEL, estimate, interval, readable, significant
 
@@ -75,7 +76,7 @@ class Constant:
 
     def of_times(self, factor: float) -> "Constant":
         """Return it where all times are a factor of those here."""
-        by = factor ** _SECONDS.get(self.unit, 0)
+        by = factor ** POWERS_OF_TIME.get(self.unit, 0)
         ends = None if self.ci95 is None else (by * self.ci95[0], by * self.ci95[1])
         each = tuple((by * value, determined) for value, determined in self.by_mode)
         return replace(self, value=by * self.value, ci95=ends, by_mode=each)
@@ -252,8 +253,6 @@ _MINUS = "−"
 _OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
 _SMALL = 1e-3  # Share of the largest of several values below which the least is none
 _NEAR_END = 0.1  # Share of an interval at its ends in which a value is not near its middle
-# Power of time in units that have one
-_SECONDS = {"s": 1, "Pa s": 1, "Pa s^2": 2, "1/s": -1, "1/(Pa s)": -1, "Pa/s": -1}
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 # Symbol and meaning of constants that no effect has
 _SYMBOLS = {

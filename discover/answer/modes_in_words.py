@@ -25,11 +25,12 @@ def scaled(factor: float) -> str:
 
 
 def at_use(answer: Any) -> Any:
-    """Return an answer with its times at the temperature of the fitted runs, if they have one."""
+    """Return an answer with its law at the temperature of the fitted runs, if they have one."""
     at, factors, modes = [*answer.range.by_temperature], answer.shift_factors, answer.modes
     by = factors.get(at[0]) if len(at) == 1 and answer.temperature_C is not None else None
     if by is None:
         return answer
+    laws = {name: getattr(answer, name) for name in ("equation", "shown", "classical")}
     rest = {t: a / by for t, a in {**factors, answer.temperature_C: 1.0}.items() if t != at[0]}
     return replace(
         answer,
@@ -39,6 +40,7 @@ def at_use(answer: Any) -> Any:
         temperature_C=at[0],
         shift_factors=dict(sorted(rest.items(), reverse=True)),
         range=replace(answer.range, rate_1_s=answer.range.by_temperature[at[0]].rate_1_s),
+        **{name: one and one.of_times(by) for name, one in laws.items()},
     )
 
 

@@ -36,6 +36,10 @@ Scale = Literal[
 """What sets the natural size of a parameter: a property of the data, or nothing (``one``)."""
 
 
+POWERS_OF_TIME = {"s": 1, "Pa s": 1, "Pa s^2": 2, "1/s": -1, "1/(Pa s)": -1, "Pa/s": -1}
+"""By the unit of a constant, its power of the relaxation times when all of them change."""
+
+
 @dataclass(frozen=True)
 class EffectParameter:
     """Parameter of an effect with its physical range; a fit that ends at the range is no finding.

@@ -123,6 +123,18 @@ class Equation(NotebookView):
         """λ̄ = Σ G λ² / Σ G λ in s, the time in Wi and De."""
         return mean_relaxation_time(self.modulus, self.relaxation_time)
 
+    def of_times(self, factor: float) -> "Equation":
+        """Return the fluid at a temperature where all its times are a factor of those here.
+
+        [Ferry 1980, ch. 11: moduli are the same].
+        """
+        return replace(
+            self,
+            relaxation_time=tuple(factor * time for time in self.relaxation_time),
+            solvent_viscosity=factor * self.solvent_viscosity,
+            states=tuple(part.of_times(factor) for part in self.states),
+        )
+
     def mode(self, number: int) -> "Equation":
         """Return the equation of one mode alone, counted from 0, without the solvent."""
         named = self.named

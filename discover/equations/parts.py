@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect, StateEffect, WrittenState, known_effects
+from discover.effects.base import POWERS_OF_TIME
 from discover.errors import InputError
 from discover.laws import LAWS, AbstractConstitutiveLaw, make_law
 from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
@@ -104,6 +105,15 @@ class StatePart:
         if not isinstance(known.effect, StateEffect) or any(v is None for v in known.values):
             raise InputError(f"The effect {self.effect!r} has no state, or a parameter no value.")
         return known.effect
+
+    def of_times(self, factor: float) -> "StatePart":
+        """Return it where all times are a factor of those here."""
+        units = {one.name: one.unit for one in self.own.parameters}
+        values = {
+            name: value * factor ** POWERS_OF_TIME.get(units[name], 0)
+            for name, value in self.values.items()
+        }
+        return replace(self, values=values)
 
     @property
     def written(self) -> WrittenState:

@@ -99,8 +99,11 @@ def loop_answer(result: Any) -> Answer:
         classical = None if near is None else near.equation
         shown, others = _shown(result)
         written = {"formula": rest_of_h(others)} if others else {}
-        return replace(answer, shown=shown, classical=classical, written=written)
-    return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+        answer = replace(answer, shown=shown, classical=classical, written=written)
+        return modes.at_use(answer)
+    answer = modes.at_use(replace(answer, equation=equation))
+    notes = *equation.notes, *answer.lines
+    return replace(answer, equation=replace(answer.equation, notes=notes))
 
 
 def _scatter(records: Sequence[RunRecord]) -> str:

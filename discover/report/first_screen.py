@@ -25,11 +25,8 @@ _COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
 
 def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
-    return None if answer is None else _screen(answer, modes.at_use(answer))
-
-
-def _screen(written: Answer, answer: Answer) -> dict[str, Any]:
-    """Return what the page shows of an answer, and what it copies of it as it is written."""
+    if answer is None:
+        return None
     headline, quality = map(unbroken, sentences.first_lines(answer))
     symbols = [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
@@ -52,10 +49,9 @@ def _screen(written: Answer, answer: Answer) -> dict[str, Any]:
         "title": (answer.title or answer.instead.lower()).partition(":")[0],
         "headline": headline,
         "quality": quality,
-        "fitted": (fitted := _fitted(written, answer))[0],
-        "reference": fitted[1],
+        "fitted": _fitted(answer),
         "open": not (answer.title and answer.adequate is not False and not doubts),
-        "law": _typeset(written),
+        "law": _typeset(answer),
         "constants": [
             (symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
@@ -64,7 +60,7 @@ def _screen(written: Answer, answer: Answer) -> dict[str, Any]:
         "suspects": [_suspected(one, sentences.separable(answer)) for one in answer.suspects],
         "suspected": sentences.SUSPECTED.lower() + clock,
         "expected": errors(answer) if answer.title else (),
-        "copies": (copies := _copies(written) if answer.title else []),
+        "copies": (copies := _copies(answer) if answer.title else []),
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "missing": _not_there(copies),
         "behind": unbroken(answer.alternative),
@@ -72,15 +68,11 @@ def _screen(written: Answer, answer: Answer) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fitted(written: Answer, answer: Answer) -> tuple[str, str]:
-    """Return in which flows constants were fitted and where times hold, and times as written."""
+def _fitted(answer: Answer) -> str:
+    """Return in which flows constants were fitted, and at which temperature times hold."""
     flows = f"fitted in {sentences.flows_of(answer.range.flows)}"
-    if written is not answer and written.temperature_C is not None:
-        by = modes.scaled(answer.shift_factors[written.temperature_C]).replace(" by", " times by")
-        reference = f"Copies and tables further below are for {modes.reduced_to(written)}: {by}."
-        return f" at {modes.reduced_to(answer)} ({flows})", reference
     at = f"; times are for {modes.reduced_to(answer)}" * bool(answer.shift_factors)
-    return f" ({flows}{at})" * any(one.ci95 is not None for one in answer.constants), ""
+    return f" ({flows}{at})" * any(one.ci95 is not None for one in answer.constants)
 
 
 def _said(one: Constant) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from discover.answer.modes_in_words import reduced_to
 from discover.laws.registry import LAWS
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
@@ -80,6 +81,7 @@ def write_loop(
         kinds=KINDS,
         remaining=remaining_rows(result),
         small_faults=SMALL_FAULTS,
+        reference=reduced_to(result) * any(one.shift != 1.0 for one in result.records),
         pictures=drawn,
         run=run
         or made_by(

@@ -9,6 +9,7 @@ from made_up_answer import MELT, headline, page_of, screen_of
 from test_loop_report import loop_result
 
 from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
+from discover.answer.modes_in_words import at_use
 from discover.answer.sentences import tolerance
 from discover.effects.registry import named_effects
 from discover.equations import Equation
@@ -235,18 +236,25 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     assert "modes (given) at −35 °C: G" in render("answer.html", screen=screen)
     hot = replace(shifted, range=replace(MELT.range, by_temperature={-10.0: MELT.range}))
     time = Constant("t", 1312.34, (1000.0, 1500.0), "s")
-    told = screen_of(hot, constants=(time, Constant("k", 0.02, (0.01, 0.03), "1/s")))
-    assert told["fitted"] == " at −10 °C (fitted in shear)"
-    assert told["reference"] == (
-        "Copies and tables further below are for −35 °C: multiply times by 131."
-    )
-    times = [row[2].split("\N{NO-BREAK SPACE}")[0] for row in told["constants"]]
+    thixotropy = StatePart("thixotropy", {"breakdown": 0.2, "build_up_time": 1312.34})
+    law = Equation((), (100.0,), (1312.34,), solvent_viscosity=1312.34, states=(thixotropy,))
+    constants = (time, Constant("k", 0.02, (0.01, 0.03), "1/s"))
+    used = at_use(replace(hot, constants=constants, equation=law))
+    assert screen_of(used)["fitted"] == " (fitted in shear; times are for −10 °C)"
     # 1312 s over 131, and 0.02 1/s times 131
-    assert [float(re.split(r"[^\d.]", one)[0]) for one in times] == [10.0, 2.6]
+    assert [one.value for one in used.constants] == pytest.approx([10.0, 2.62468])
+    # times and viscosities over 131.234; moduli and pure numbers are what they are
+    assert (used.equation.modulus, used.equation.relaxation_time) == (
+        (100.0,),
+        (pytest.approx(10.0),),
+    )
+    assert used.equation.solvent_viscosity == pytest.approx(10.0)
+    assert used.equation.states[0].values == pytest.approx(
+        {"breakdown": 0.2, "build_up_time": 10.0}
+    )
     # 131.234 over 14.771, and 131.234
-    assert [one[:2] for one in told["shifts"]] == [("−23 °C", "8.88"), ("−35 °C", "131")]
-    assert hot.use["temperature_C"] == -35.0
-    assert '"temperature_C": -35' in told["copies"][-1]["text"]
+    assert used.use["temperature_C"] == -10.0
+    assert used.use["shift_factors"] == pytest.approx({"-23": 8.8846, "-35": 131.234}, rel=1e-4)
     cold = replace(shifted, shift_factors={-50.0: 20.0})
     assert any("times: multiply by 20 for −50 °C" in line for line in cold.lines)
     clock = "times on the instrument's clock"  # which is not shifted
