@@ -47,14 +47,14 @@ def errors(answer: Any) -> list[Errors]:
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         near, far = ("" if value is None else at_most(value) for value in one.spread)
-        if one.is_measured and (one.inside is not None or (one.is_known and not far)):
+        if one.is_measured and one.is_known:
             beyond, at = "not measured", ""
-            if one.beyond is not None and not far:
-                beyond, at = at_most(one.beyond), one.beyond_at
+            if one.beyond is not None:
+                beyond, at = at_most(one.beyond), one.beyond_at or _BY_LAWS
             measured.append(Row(symbol, _note(answer, one), _inside(answer, one), beyond, at))
-        if near or far:
+        if near:
             apart = True
-            by_law.append(Row(symbol, one.note * bool(near), near or "see above", far))
+            by_law.append(Row(symbol, one.note, near, far))
         elif not one.is_known:
             row = Row(symbol, "", one.note or one.missing, None)
             if by_law and by_law[-1] == row._replace(symbol=by_law[-1].symbol):
@@ -76,6 +76,7 @@ def errors(answer: Any) -> list[Errors]:
 
 _INSIDE, _BEYOND = "in\N{NO-BREAK SPACE}range", "beyond the range"
 _UNTESTED, _TWICE = "Never tested", "at twice the highest rate"
+_BY_LAWS = f"untested: equally good laws {_TWICE}"
 
 
 def _title(answer: Any) -> str:

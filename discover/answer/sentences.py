@@ -9,7 +9,10 @@ from discover.words import LEVEL, counted, effect_title, listed, percent_of, sig
 _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
 # many), and how brief `description` is
-_SHORTER = ((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), *((-1, brief) for brief in range(2, 6)))
+_SHORTER = (
+    *((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3)),
+    *((-1, brief) for brief in range(2, 6)),
+)
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -65,10 +68,8 @@ def _law(answer: Any, most: int) -> str:
     named, every = constants(certain[: max(most, 0)]), answer.constants
     if answer.law is None and len(every) > min(most, len(certain)):  # some alone are no law
         each = [one.symbol for one in every if one.over_modes is not None]
-        none = sum(not one.determined for one in every)
-        poor = sum(one.is_poor for one in every) - none
-        sure = ", ".join(filter(None, [f"{poor} poorly" * bool(poor), f"{none} not" * bool(none)]))
-        count = counted(len(every) - len(each), "constant") + f" ({sure} determined)" * bool(sure)
+        poor = sum(one.is_poor for one in every)
+        count = counted(len(every) - len(each), "constant") + f" ({poor} {POORLY})" * bool(poor)
         named = [" and ".join([count, *(f"{one} by mode" for one in each)])] * (most >= 0)
         certain = []
     if several:
@@ -235,7 +236,7 @@ _FLOWS = {
 
 
 def usable(answer: Any) -> tuple[list[str], str]:
-    """Return for what the law may be used, and for what it may not before that is tested.
+    """Return for what the law may be used, and what else it predicts.
 
     That is what nothing tested and equally good laws agree in, up to the first that they do not.
     """
@@ -252,9 +253,11 @@ def usable(answer: Any) -> tuple[list[str], str]:
                 break
             implied[SYMBOLS[name].removeprefix("uniaxial ")] = near
     tested += [flows_of([one]) for one in flows if one not in ("shear", "uniaxial")]
-    apart = at_most(max(implied.values(), default=0.0)).removeprefix("< ")
-    warned = f"Do not rely on {' or '.join(implied)} until tested: equally good laws agree within"
-    return tested, f"{warned} {apart}, but all could be wrong." * bool(implied)
+    if not implied:
+        return tested, ""
+    apart = at_most(max(implied.values())).removeprefix("< ")
+    what = f"Untested prediction{'s' * (len(implied) > 1)}: {listed([*implied])}"
+    return tested, f"{what}; equally good laws agree within {apart}."
 
 
 def where(answer: Any) -> str:
@@ -266,8 +269,9 @@ def where(answer: Any) -> str:
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     use = f"{'If that suffices, use' if _misses(answer) else 'Use'} for {listed(quantities)}"
     only = " only" * (len(quantities) == 1 and not implied)
-    place = _in_part(answer, place) or f"{only}, {place}"
-    return " ".join(filter(None, [f"{use}{place}.", implied]))
+    place = _in_part(answer, place) or f", {place}"
+    comma = "," * bool(only and not place.startswith(","))
+    return " ".join(filter(None, [f"{use}{only}{comma}{place}.", implied]))
 
 
 def _in_part(answer: Any, place: str) -> str:

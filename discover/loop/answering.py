@@ -113,7 +113,7 @@ def _scatter(records: Sequence[RunRecord]) -> str:
         return ""
     noise = modes.span((min(one.scatter for one in own), max(one.scatter for one in own)))
     most = modes.short(max(one.mean_below for one in own))
-    return f" of {noise} Pa rms; a fluid's mean stress is below {most} Pa (95 %)"
+    return f" of {noise} Pa rms; the sample's mean stress is below {most} Pa (95 %)"
 
 
 def _falls_above(result: Any) -> str:

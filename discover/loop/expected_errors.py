@@ -41,7 +41,7 @@ class Spread:
     by their rms, with the sign of N2/N1; None of other quantities. The largest in flows inside, of
     which `over_n1_rate` in 1/s is the rate. `stress`: the quantity
     itself by the reported law, rms in Pa of the fastest flow inside; None where it diverges.
-    `falls_above`: of σ12, see `falls_above`.
+    `falls_above`, `steady`: of σ12 and of N1, see `steady_shear`.
     """
 
     inside: float | None
@@ -50,6 +50,7 @@ class Spread:
     stress: float | None = None
     falls_above: float | None = None
     over_n1_rate: float | None = None
+    steady: float | None = None
 
 
 @in_one_thread
@@ -84,7 +85,7 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             apart = np.sqrt(square) / size[[0, 1, 1]] if share >= _MOST_OF_THEM else np.nan * size
             found.append((size, apart, over_n1))
     size, apart, ratios = (np.array(each) for each in zip(*found, strict=True))
-    falls = falls_above(posterior.problem.model, best.theta, rates)
+    falls, steady = steady_shear(posterior.problem.model, best.theta, rates)
     at = int(np.argmax(np.abs(ratios[:n])))  # one that is not finite first
     over_n1 = _largest(ratios[[at]])
     rate = None if over_n1 is None else float(np.max(np.abs(inside[at].rate)))
@@ -98,18 +99,20 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             _largest(stress),
             falls if kind == "sigma12" else None,
             rate if kind == "N2" else None,
+            steady if kind == "N1" else None,
         )
         for kind, within, beyond, stress in columns
     }
 
 
-def falls_above(
+def steady_shear(
     model: AugmentedModel, theta: Float[np.ndarray, " p"], rates: Sequence[float]
-) -> float | None:
-    """Return the rate in 1/s above which the law's steady shear stress falls as the rate grows.
+) -> tuple[float | None, float | None]:
+    """Return the rate in 1/s above which the law's stress falls, and N1 in Pa at the fastest.
 
-    Between the ends of `rates` in 1/s; None where it rises throughout. The instrument is ideal,
-    and a start-up of a long strain stands for steady flow: its program is made already.
+    In steady shear between the ends of `rates` in 1/s; None where the stress rises throughout, and
+    where there is no N1. The instrument is ideal, and a start-up of a long strain stands for steady
+    flow: its program is made already.
     """
     law = theta.copy()
     for effect in model.effects:
@@ -118,9 +121,9 @@ def falls_above(
     curve = np.geomspace(min(rates), max(rates), _CURVE)
     flows = [_start_up(rate, _STEADY) for rate in curve]
     with np.errstate(all="ignore"):
-        stress = model.observables(law[None], make_batch(flows))[0, :, _SAMPLES - 1, 0]
-    falling = np.flatnonzero(np.diff(stress) < -_ROUNDING * stress[:-1])
-    return float(curve[falling[0]]) if falling.size else None
+        found = model.observables(law[None], make_batch(flows))[0, :, _SAMPLES - 1]
+    falling = np.flatnonzero(np.diff(found[:, 0]) < -_ROUNDING * found[:-1, 0])
+    return float(curve[falling[0]]) if falling.size else None, _largest(found[-1:, 1])
 
 
 # Rates of a flow curve, the strain at which it is taken, and the relative error of an integration

@@ -23,7 +23,7 @@ from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.laws import Fluid
 from discover.linear_algebra_threads import in_one_thread
-from discover.loop.expected_errors import falls_above
+from discover.loop.expected_errors import steady_shear
 from discover.loop.final_model import augmented_fluid, states_of
 from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
 from discover.statistics.noise.noise_model import rms
@@ -118,7 +118,7 @@ def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
         constants[key] = StageParameter(value, ends, "1")
     rates = [float(np.max(np.abs(run.rate))) for run in posterior.problem.fitted.runs]
     rates = [rate for rate in rates if rate > 0.0]
-    falls = bool(rates) and falls_above(posterior.problem.model, fit.theta, rates) is not None
+    falls = bool(rates) and steady_shear(posterior.problem.model, fit.theta, rates)[0] is not None
     return NearestLaw(name, constants, size, equation, falls)
 
 

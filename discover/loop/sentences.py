@@ -175,7 +175,9 @@ def _of_predicted_n1(result: Any) -> str:
         return ""
     if any(record.has_normal_stress for record in result.records):
         return "Fit N1 too, which runs recorded: the law predicts it, and observe leaves it out."
-    return f"Measure N1 at {_fastest(_sheared(result))}: it tests the law."
+    found = result.spread_of_laws["N1"].steady
+    what = "" if found is None else f", where it predicts {words.significant(found, 2)} Pa"
+    return f"Test the law by N1 in steady shear at {_fastest(_sheared(result))}{what}."
 
 
 def _sheared(result: Any) -> list[RunRecord]:
@@ -215,10 +217,9 @@ def _by_geometry(result: Any) -> str:
     own = _sheared(result) or [record for record in result.records if not record.held_out]
     sizes = {record.name: by_run.get(record.name, float(record.errors[-1])) for record in own}
     worst = max(own, key=lambda record: sizes[record.name], default=None)
-    run, why = "one run", ""
-    if worst is not None:
-        run, why = described(worst), f"it fits worst ({words.percent_of(sizes[worst.name])}); "
-    return f"Repeat {run} with another gap: {why}if its misfit changes, suspect the instrument."
+    run = "one run" if worst is None else described(worst)
+    after = "if its misfit changes, suspect the instrument, else the law"
+    return f"Repeat {run} with another gap; {after}."
 
 
 def _telling_test(result: Any) -> str:

@@ -11,7 +11,7 @@ from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.loop.answering import _constants, shows_a_derivative
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
-from discover.loop.expected_errors import Spread, falls_above
+from discover.loop.expected_errors import Spread, steady_shear
 from discover.loop.fitted_range import described, range_of
 from discover.loop.from_posterior import Ended
 from discover.loop.parts import ErrorPair, Stage, StageParameter
@@ -221,8 +221,8 @@ def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_f
     found.discrepancy["by_run"] = {"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4}
     told = what_to_measure_next(found)
     assert told == (
-        "Repeat the start-up at 1 1/s (fast) with another gap: it fits worst (8 %); "
-        "if its misfit changes, suspect the instrument."
+        "Repeat the start-up at 1 1/s (fast) with another gap; if its misfit changes, suspect the "
+        "instrument, else the law."
     )
     # a miss within the noise is none to look into
     assert what_to_measure_next(result(FITTED, noise_floor=0.1)).startswith("Measure N1")
@@ -231,12 +231,14 @@ def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_f
 def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
     pair = ErrorPair(0.05, None)
     law = Stage("ptt_linear", "constitutive", {}, (), pair, 99.0, "", "", "Extend it.")
-    known = {"N1": Spread(0.014, 0.02, stress=100.0), "uniaxial": Spread(0.01, 0.01)}
+    known = {"N1": Spread(0.014, 0.02, stress=100.0, steady=251.0), "uniaxial": Spread(0.01, 0.01)}
     found = result(
         FITTED, verdict="effects_added", stages=(law,), spread_of_laws=known,
         explanations=SimpleNamespace(holding=lambda names: None),
     )  # fmt: skip
-    assert what_to_measure_next(found) == "Measure N1 at 1 1/s: it tests the law."
+    assert what_to_measure_next(found) == (
+        "Test the law by N1 in steady shear at 1 1/s, where it predicts 250 Pa."
+    )
     found.records = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
     assert what_to_measure_next(found).startswith("Fit N1 too, which runs recorded")
     # not where it cannot be measured, was, or other effects make the same records
@@ -330,21 +332,21 @@ def test_constants_of_an_effect_that_may_be_absent_are_not_determined():
 
 
 @pytest.mark.parametrize("alpha", [0.49, 0.7])
-def test_a_flow_curve_that_falls_says_from_which_rate(alpha):
+def test_a_flow_curve_that_falls_says_from_which_rate_and_its_n1_at_the_fastest(alpha):
     # a Giesekus mode in steady shear, in closed form [Giesekus 1982]: it rises where α ≤ 1/2
-    def stress(wi):
-        root = 16.0 * alpha * (1.0 - alpha) * wi**2
-        chi = np.sqrt((np.sqrt(1.0 + root) - 1.0) / (0.5 * root))
-        f = (1.0 - chi) / (1.0 + (1.0 - 2.0 * alpha) * chi)
-        return wi * (1.0 - f) ** 2 / (1.0 + (1.0 - 2.0 * alpha) * f)
-
     rates = np.geomspace(0.3, 30.0, 2000)
-    peak = rates[np.argmax(stress(rates))]
+    root = 16.0 * alpha * (1.0 - alpha) * rates**2
+    chi = np.sqrt((np.sqrt(1.0 + root) - 1.0) / (0.5 * root))
+    f = (1.0 - chi) / (1.0 + (1.0 - 2.0 * alpha) * chi)
+    stress = rates * (1.0 - f) ** 2 / (1.0 + (1.0 - 2.0 * alpha) * f)
+    n1 = 2.0 * f * (1.0 - alpha * f) / (alpha * (1.0 - f))
+    peak = rates[np.argmax(stress)]
     law = DeclaredModel.named("giesekus", {"alpha": alpha}, np.ones(1), np.ones(1))
     model = AugmentedModel(law, [make_effect("edge_fracture")])
     theta = model.zero()
     theta[model.slices["edge_fracture"].start] = 0.02  # the instrument is none of the law
-    found = falls_above(model, theta, [0.3, 30.0])
+    found, fastest_n1 = steady_shear(model, theta, [0.3, 30.0])
+    assert fastest_n1 == pytest.approx(n1[-1], rel=1e-4)  # of an integration to a strain of 100
     if alpha < 0.5:
         assert found is None
         return

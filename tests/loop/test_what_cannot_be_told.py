@@ -64,7 +64,7 @@ def test_pure_noise_is_no_signal(seed, declared):
     assert sentences[0].startswith("No signal")
     assert "explains" not in sentences[0]
     assert "sensor is connected" in result.answer.next_test
-    form = r"only noise of (.*)–(.*) Pa rms; a fluid's mean stress is below (.*) Pa \(95 %\), so"
+    form = r"only noise of (.*)–(.*) Pa rms; the sample's mean stress is below (.*) Pa \(95 %\), so"
     said = re.search(form, result.answer.headline)
     assert said
     *noise, most = map(float, said.groups())

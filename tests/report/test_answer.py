@@ -38,7 +38,7 @@ def test_the_first_line_has_law_constants_error_and_range():
     assert "within 5 % up to 1 1/s; up to 8 % off above." in up_to
     found, tests = replace(MELT.discrepancy, met_up_to="1 1/s"), ("start-up",)
     melt = replace(MELT, discrepancy=found, range=replace(MELT.range, tests=tests))
-    use = "Use for σ12 in start-up: within 5 % at 0.003–1 1/s; up to 8 % off at 1–3 1/s."
+    use = "Use for σ12 only, in start-up: within 5 % at 0.003–1 1/s; up to 8 % off at 1–3 1/s."
     assert use in melt.headline
     hot = replace(melt.range, by_temperature={-10.0: replace(melt.range, rate_1_s=(1.0, 9.0))})
     use = "in start-up at −10 °C: within 5 % at 1 1/s; up to 8 % off at 1–9 1/s."
@@ -88,7 +88,7 @@ AGREED = ExpectedError(0.03, is_measured=False, spread=(0.03, 0.04))
 def test_a_law_is_of_use_for_what_the_table_has_a_good_number_of(flows, errors, said):
     answer = replace(MELT, range=replace(MELT.range, flows=flows), expected_error=errors)
     assert f"se for {said}, 0.003–3 1/s" in answer.headline
-    n1 = "Do not rely on N1 until tested: equally good laws agree within 3 %, but all could be"
+    n1 = "Untested prediction: N1; equally good laws agree within 3 %."
     assert (n1 in answer.headline) is (said == "σ12")
     # what is as good as was asked has no condition
     good = headline(answer, tolerance=0.6)
@@ -343,7 +343,7 @@ def test_a_constant_that_differs_from_mode_to_mode_is_a_range_over_them():
     own = Constant("modulus_Pa", 2.0, (1.0, 3.0), "Pa")
     assert origin(replace(MELT, constants=(own,))) == " (fitted)"
     both = replace(fit, constants=(added, replace(added, determined=False)))
-    assert "2 constants (1 poorly, 1 not determined), 2 modes." in both.headline
+    assert "2 constants (2 poorly determined), 2 modes." in both.headline
     assert [row[0] for row in table(fit)[1]] == ["1", "2 (added)"]
 
 

@@ -188,7 +188,7 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
     up_to = replace(runs, met_up_to="0.3 1/s")
     one_range = replace(MELT, discrepancy=up_to)  # and not a second one with the tolerance
     assert not tolerance(one_range)
-    assert "Use for σ12, 0.003–3 1/s: within 5 % up to 0.3 1/s; up to 9 % off above." in (
+    assert "Use for σ12 only, 0.003–3 1/s: within 5 % up to 0.3 1/s; up to 9 % off above." in (
         one_range.headline
     )
     assert screen_of(several)["expected"][0].rows[-1].note == "b"
