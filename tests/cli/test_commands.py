@@ -8,11 +8,10 @@ import zlib
 
 import numpy as np
 import pytest
+from command_line import invoke
 from fewer_hypotheses import few_candidates, verdict_alone
 from made_exports import write_runs
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.compilation_cache import enable_compilation_cache, remove_cut_short
 from discover.learners import LearnerResult, RecoveredTerm
 
@@ -35,12 +34,6 @@ library = { degree = 0 }
 high_deborah = [1.5]
 next = { weissenberg_numbers = [1.0], deborah_numbers = [1.0] }
 """
-
-
-def invoke(*arguments, code=None):
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert code is None or done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture

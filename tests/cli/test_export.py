@@ -8,9 +8,8 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
-from discover.cli import app
 from discover.effects import make_effect
 from discover.equations import AugmentedLaw, Box, Equation, StatePart, equation_to_json
 from discover.equations import Tested as Where
@@ -19,12 +18,6 @@ from discover.laws import Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
 from discover.loop.parts import ConstantByMode, DeclaredEffect, ModeConstant, NearestLaw
 from tensor_library import LawTerm
-
-
-def invoke(*arguments, code=None):
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert code is None or done.exit_code == code, done.output
-    return done
 
 
 def module_at(path):

@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from command_line import invoke
 from made_exports import LAMBDA as RELAXATION_TIME
 from made_exports import G as MODULUS
 from made_exports import sweep_table, write_runs
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.dataset import check_folder, load_dataset
 from discover.errors import InputError
 from discover.study import parse_study
@@ -278,17 +277,11 @@ def test_runs_at_several_temperatures_are_told_unless_their_times_are_shifted(fo
 
 
 def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):
-    def check(root, *options):
-        return CliRunner().invoke(app, ["data", "check", str(root), *options])
-
-    doubtful = check(folder(spiked()))
-    assert doubtful.exit_code == 0
-    assert "warning: " in doubtful.stdout
-    report = json.loads(check(folder(spiked()), "--json").stdout)
+    assert "warning: " in invoke("data", "check", folder(spiked()), code=0).stdout
+    report = json.loads(invoke("data", "check", folder(spiked()), "--json").stdout)
     assert report["errors"] == []
     assert report["warnings"][0]["subject"] == "outliers"
-    wrong = check(folder(start_up(stress_Pa=np.negative)))
-    assert wrong.exit_code == 2
+    wrong = invoke("data", "check", folder(start_up(stress_Pa=np.negative)), code=2)
     assert "opposite to the shear rate" in wrong.stderr
 
 

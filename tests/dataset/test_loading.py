@@ -98,14 +98,6 @@ def test_smoothing_reduces_noise_and_keeps_a_cubic_on_uneven_samples():
     assert smooth < 0.5 * rough
 
 
-def test_a_sound_folder_has_only_the_problem_of_short_runs(folder):
-    rows = "".join(f"{t},1,{t}\n" for t in range(12))
-    text = "time_s,shear_rate_1_s,stress_Pa\n" + rows
-    other = text.replace("11,1,11", "11.5,1,11")
-    assert check_folder(folder(a__csv=text, b__csv=other)) == ()
-    assert any("only 3 samples" in finding.text for finding in check_folder(folder()))
-
-
 def test_every_bad_clock_factor_is_told_at_once(folder):
     index = "file,factor\na.csv,0\nb.csv,2\nc.csv,-1\nd.csv,\ne.csv,x\n"
     root = folder(runs__csv=index)

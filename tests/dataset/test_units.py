@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from command_line import invoke
 from made_exports import columns, csv, write_files
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.dataset import check_folder, load_dataset
 from discover.dataset.importing import import_files
 from discover.dataset.importing.mapping import Mapping
@@ -104,8 +103,7 @@ def test_every_conversion_is_said_and_si_units_are_none(tmp_path):
 
 def test_an_import_says_its_conversions(tmp_path):
     (tmp_path / "x.csv").write_text("Time [s],Shear rate [1/s],Stress [kPa]\n" + ROWS)
-    arguments = ["data", "import", str(tmp_path / "x.csv"), "--out", str(tmp_path / "out")]
-    said = CliRunner().invoke(app, arguments).output
+    said = invoke("data", "import", tmp_path / "x.csv", "--out", tmp_path / "out").output
     assert "stress = Stress [kPa] × 1000" in said
     assert "Time [s] ×" not in said
 

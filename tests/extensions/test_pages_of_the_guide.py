@@ -8,10 +8,9 @@ import shlex
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 from user_packages import LEARNER_CODE, Workplace, blocks, install, project
 
-from discover.cli import app
 from discover.dataset import load_dataset
 from discover.laws.registry import _named_laws
 
@@ -233,9 +232,7 @@ def test_without_the_package_the_study_of_the_page_is_refused(workplace, page, s
     # negative control of the tests above, in this process, where nothing is installed
     study, out = workplace.folder / workplace.study(page), workplace.folder / "out"
     command = "close-loop" if page in (LAW, EFFECT) else "compare"
-    done = CliRunner().invoke(app, [command, str(study), "--out", str(out)])
-    assert done.exit_code == 2
-    assert said in done.stderr
+    assert said in invoke(command, study, "--out", out, code=2).stderr
 
 
 @pytest.mark.slow
