@@ -115,22 +115,6 @@ def test_german_rheocompass_with_waveforms_gives_the_sweep_and_the_waves(tmp_pat
     assert "periodic steady state" in result.stdout
 
 
-def test_french_names_are_known(tmp_path):
-    names = ["Interval données:", "Point No.", "Intervalle Temps", "Déformation de Cisaillement"]
-    names += ["Contrainte de Cisaillement", "Température"]
-    rows = ["\t".join(names), "", "\t\t[s]\t[%]\t[mPa]\t[°C]"]
-    decay = G * np.exp(-TIMES / LAMBDA)
-    columns = TIMES, np.full(30, 5.0), 50.0 * decay, np.full(30, 25.0)
-    for i, row in enumerate(lines(*columns, comma=True), start=1):
-        rows.append(f"\t{i}\t{row}")
-    out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
-    (test,) = load_dataset(out)
-    assert float(test.metadata["step_strain"]) == 0.05
-    assert test.metadata["temperature_C"] == 25.0
-    np.testing.assert_allclose(test.stress, 0.05 * decay, rtol=EXACT)
-    assert "relaxation after a step of strain" in result.stdout
-
-
 def test_actions_of_rspace_are_told_apart_by_their_name_in_the_first_column(tmp_path):
     head = "Action Name;Time (action)(s);Shear stress(Pa);Shear rate(s-¹);Complex shear strain(%);"
     head += "Frequency(Hz);Shear modulus (elastic component)(Pa);"

@@ -58,9 +58,7 @@ def test_units_in_column_names_are_converted(folder):
     np.testing.assert_allclose(data.linear_sweep.loss_modulus, 1.0)  # 10 dyn/cm2 = 1 Pa
 
 
-def test_a_rate_is_derived_from_strain_said_to_be_and_measured_then_or_where_the_caller_says_so(
-    folder,
-):
+def test_a_rate_derived_from_strain_is_said_and_measured_or_as_the_caller_says(folder):
     time = np.linspace(0, 6, 400)
     rows = "\n".join(f"{t:.8f},{np.sin(t):.10f},1" for t in time)
     run = load_dataset(folder(a__csv="time_s,strain,stress_Pa\n" + rows))["a.csv"]

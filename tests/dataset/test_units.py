@@ -227,9 +227,7 @@ def test_a_viscosity_without_a_unit_is_asked_for_only_where_it_stands_for_the_st
     np.testing.assert_allclose(got["stress_Pa"], STRESS)
 
 
-def test_no_unit_is_asked_of_a_temperature_a_table_of_our_own_or_a_strain_that_is_not_used(
-    tmp_path,
-):
+def test_no_unit_is_asked_of_a_temperature_our_own_table_or_an_unused_strain(tmp_path):
     rate = np.geomspace(1.0, 100.0, 6)
     text = table(T=np.full(6, 25.0), **{"Shear rate": rate, "Stress": STRESS})
     assert "flow_curve.csv" in read(tmp_path, text).files

@@ -54,9 +54,7 @@ def test_a_flow_at_a_given_rate_whose_stress_is_constant_stays_one(tmp_path, whi
         ("strain", 0.0, []), ("strain", 10.0, []),
     ],
 )  # fmt: skip
-def test_creep_and_recovery_are_one_run_whatever_their_clock_with_a_word_and_without(
-    tmp_path, moved, starts, title
-):
+def test_creep_and_recovery_are_one_run_whatever_their_clock(tmp_path, moved, starts, title):
     strain, rate = np.append(CREEP, RECOVERY), np.append(RATE, -0.2 * np.exp(-TIMES))
     columns = {"Time [s]": np.append(TIMES, starts + TIMES), "Stress [Pa]": np.append(HELD, NONE)}
     columns |= {"Strain [-]": strain} if moved == "strain" else {"Shear rate [1/s]": rate}
@@ -152,9 +150,7 @@ CLOCKED = {
 
 
 @pytest.mark.parametrize("kind", CLOCKED)
-def test_what_stands_in_a_unit_of_time_is_the_time_and_without_one_nothing_is_steady(
-    tmp_path, kind
-):
+def test_what_has_a_unit_of_time_is_the_time_and_without_one_none_is_steady(tmp_path, kind):
     columns = dict(CLOCKED[kind])
     time = columns.pop("Time [s]")
     out, _ = export(tmp_path, {"Clock of the motor [ms]": 1e3 * time, **columns})
