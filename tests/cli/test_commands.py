@@ -97,9 +97,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
     assert "--overwrite" in other.stderr
 
 
-def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
-    tmp_path, monkeypatch, trained, undrawn
-):
+def test_an_interrupted_run_says_so_and_goes_on_quietly(tmp_path, monkeypatch, trained, undrawn):
     from discover.comparison import learning as module
 
     known, kept = module.train, tmp_path / "out" / "state" / "tensor_sindy.json"
@@ -254,9 +252,7 @@ def test_a_folder_in_place_of_a_study_is_answered_with_a_study(tmp_path):
     assert "melt.toml" in meant.stderr
 
 
-def test_whole_programs_are_left_broken_ones_go_and_nothing_is_kept_where_the_user_says_so(
-    tmp_path, monkeypatch
-):
+def test_broken_programs_go_and_none_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
     whole = zlib.compress(b"program " * 1000)
     contents = {"jit_a": whole, "jit_b": whole[:-3], "jit_c": b"", "jit_d": b"nonsense"}
     for name, content in contents.items():

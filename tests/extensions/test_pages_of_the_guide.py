@@ -291,9 +291,7 @@ def test_a_sound_package_is_loaded_once_where_laws_are_asked_for_without_a_warni
     assert workplace.run("effects").stderr == ""
 
 
-def test_of_two_packages_with_one_name_the_second_is_left_out_and_one_imported_before_is_known_once(
-    workplace,
-):
+def test_of_two_packages_with_one_name_one_is_left_out_and_none_known_twice(workplace):
     for name in ("one", "two"):
         code = OWN_LAW.format(name="ours")
         install(workplace.packages, name, code, project("laws", name, ours=name))

@@ -70,9 +70,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert sum(held) >= 26
 
 
-def test_a_prediction_is_one_row_after_the_other_and_correlations_are_those_of_the_covariance(
-    data, fitted
-):
+def test_predictions_follow_their_rows_and_correlations_the_covariance(data, fitted):
     times = np.linspace(0.05, 8.0, 80)
     exact = [giesekus_start_up(rate, times) for rate in (0.5, 1.5, 3.0, 6.0)]
     # constants from 240 samples of 1 % noise: predictions are off by less than 1 %

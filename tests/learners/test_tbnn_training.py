@@ -68,9 +68,7 @@ def model(data):
     return TBNNUDE(recipe=SMALL, n_members=2).fit(data.runs)
 
 
-def test_constants_alone_recover_the_mobility_which_a_penalty_shrinks_and_the_polish_restores(
-    model,
-):
+def test_constants_recover_the_mobility_that_a_penalty_shrinks_and_a_polish_restores(model):
     # integration on the training grid errs by 4e-6 of the stress
     np.testing.assert_allclose(model.law_.constants, [0, 0, 0, 0.3, 0, 0, 0, 0], atol=1e-4)
     np.testing.assert_array_equal(model.law_.network_mask, 0.0)
