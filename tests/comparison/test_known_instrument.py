@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from independent import Giesekus, start_up
-from independent.flow import of_rate
-from independent.noise import white
+from independent.instruments import Instrument
 from noisy_runs import run_at, waves
-from scipy.signal import lfilter
 
 from discover.comparison import compare
 from discover.comparison.in_memory import compare as compare_in_memory
@@ -35,15 +33,13 @@ def oscillations(gain: float, offset: float = 0.0) -> Dataset:
     return Dataset("planted", tuple(replace(run, stress=run.stress + offset) for run in data))
 
 
-def slow_start_ups(rise_time: float, noise: float = 0.0) -> Dataset:
-    """Return start-ups of a motor that needs time, with the commanded rate as what is known."""
-    times = np.geomspace(0.02, 8.0, 40)
-    rng, runs = np.random.default_rng(1), []
+def start_ups(instrument: Instrument) -> Dataset:
+    """Return start-ups as recorded, with the commanded rate as what is known."""
+    times, runs = np.geomspace(0.02, 8.0, 40), []
     for rate in (0.5, 2.0):
-        felt = of_rate(lambda t, r=rate: r * -np.expm1(-np.asarray(t) / rise_time), 8.0)
-        stress = Giesekus(MOBILITY).respond(felt, times).sigma12
-        runs.append(run_at(rate, times, white(stress, noise, rng)))
-    return Dataset("slow motor", tuple(runs))
+        recorded = instrument.record(Giesekus(MOBILITY), start_up(rate), times)
+        runs.append(run_at(rate, times, recorded.stress))
+    return Dataset("slow", tuple(runs))
 
 
 GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": MOBILITY}))
@@ -67,29 +63,15 @@ def taken(data, effects):
     return known_part(declared, search(task).ended(), divided(data), (), ())
 
 
-def lagging(tau):
-    """Return start-ups read by a transducer whose answer lags behind by a time."""
-    fine, times = np.linspace(0.0, 8.0, 8001), np.geomspace(0.02, 8.0, 40)
-    kept, runs = np.exp(-fine[1] / tau), []
-    for rate in (0.5, 2.0):
-        stress = Giesekus(MOBILITY).respond(start_up(rate), fine).sigma12
-        read = lfilter([0.5 * (1.0 - kept)] * 2, [1.0, -kept], stress)
-        runs.append(run_at(rate, times, np.interp(times, fine, read)))
-    return Dataset("slow transducer", tuple(runs))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("make", "effect"),
-    [
-        (lambda: slow_start_ups(rise_time=0.2), {"rate_rise_time": {"tau": 0.2}}),
-        (lambda: lagging(0.2), {"transducer_lag": {"tau": 0.2}}),
-    ],
+    ("instrument", "effect"),
+    [(Instrument(rise_time=0.2), "rate_rise_time"), (Instrument(lag=0.2), "transducer_lag")],
     ids=["motor", "transducer"],
 )
-def test_what_a_slow_motor_or_transducer_did_is_taken_out(make, effect):
-    data = make()
-    for found, limit in ((taken_out(data, effect)[0].fit, 3e-3), (data, 0.1)):
+def test_what_a_slow_motor_or_transducer_did_is_taken_out(instrument, effect):
+    data = start_ups(instrument)
+    for found, limit in ((taken_out(data, {effect: {"tau": 0.2}})[0].fit, 3e-3), (data, 0.1)):
         worst = 0.0
         for run in found:
             stress = simulate(GIESEKUS, run.protocol, run.time).shear_stress
