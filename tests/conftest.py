@@ -83,13 +83,14 @@ def as_users_run_it() -> Iterator[None]:
 # files of a quarter of a minute and more, with slow tests or without, the longest first; what
 # shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
-    "test_notebooks.py", "test_engine_worlds.py", "test_many_vectors.py", "test_import.py",
-    "test_reports.py", "test_kills_and_clusters.py", "test_transducers.py", "test_posterior.py",
-    "test_commands.py", "test_hostile_rules.py", "test_contract_script.py", "test_named_law.py",
-    "test_pages_of_the_guide.py", "test_constants_by_mode.py", "test_loop.py", "test_pages.py",
-    "test_structure.py", "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
-    "test_estimators.py", "test_rolie_poly_blend.py",
-    "test_modulus_errors.py", "test_flows_of_fluids.py", "test_law_choice.py",
+    "test_notebooks.py", "test_simple_material.py", "test_engine_worlds.py", "test_many_vectors.py",
+    "test_import.py", "test_reports.py", "test_kills_and_clusters.py", "test_transducers.py",
+    "test_posterior.py", "test_commands.py", "test_hostile_rules.py", "test_contract_script.py",
+    "test_named_law.py", "test_pages_of_the_guide.py", "test_constants_by_mode.py", "test_loop.py",
+    "test_pages.py", "test_structure.py", "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
+    "test_estimators.py", "test_rolie_poly_blend.py", "test_modulus_errors.py",
+    "test_flows_of_fluids.py", "test_law_choice.py", "test_controls_side_by_side.py",
+    "test_malformed_inputs.py",
 )  # fmt: skip
 
 

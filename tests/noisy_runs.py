@@ -1,6 +1,7 @@
-"""Start-ups with white noise of fluids that share no code with ours."""
+"""Records with white noise, drawn in turn, of fluids that share no code with ours."""
 
 import numpy as np
+from independent import oscillation
 from independent import start_up as flow_at
 from independent.noise import white
 
@@ -13,10 +14,25 @@ def run_at(rate, times, stress, name="", **more):
     return dc.Run(name or f"{rate:g}", times, dc.start_up(rate), rates, stress, **more)
 
 
+def run_of_wave(amplitude, frequency, times, stress, name=""):
+    """Return an oscillation of the rate from rest with this record."""
+    flow, rates = dc.oscillatory_shear(amplitude, frequency), amplitude * np.cos(frequency * times)
+    return dc.Run(name or f"{amplitude:g}_{frequency:g}", times, flow, rates, stress)
+
+
 def start_ups(law, rates, times, noise=0.01, seed=0, factor=1.0, names=None):
-    """Return a start-up at each rate, with noise of one seed drawn in turn."""
+    """Return a start-up at each rate."""
     lot, runs = np.random.default_rng(seed), []
     for rate, name in zip(rates, names or [""] * len(rates), strict=True):
         stress = white(factor * law.respond(flow_at(rate), times).sigma12, noise, lot)
         runs.append(run_at(rate, times, stress, name))
     return dc.Dataset("start-ups", tuple(runs))
+
+
+def waves(law, amplitudes, times, noise=0.01, seed=0, factor=1.0):
+    """Return an oscillation for each pair of an amplitude in 1/s and a frequency in rad/s."""
+    lot, runs = np.random.default_rng(seed), []
+    for pair in amplitudes:
+        stress = white(factor * law.respond(oscillation(*pair), times).sigma12, noise, lot)
+        runs.append(run_of_wave(*pair, times, stress))
+    return dc.Dataset("oscillations", tuple(runs))

@@ -1,18 +1,23 @@
 """Results in a notebook: every one shows its sentences, law and tables, and escapes its text."""
 
+import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 import pytest
+import sympy
 
 from discover.comparison import LearnerOutcome
 from discover.equations import Box, Equation
 from discover.equations import Tested as WhereTested
 from discover.identify import Difference, HiddenStresses, Twin
 from discover.identify.structure import LawStructure, QuantityVerdict, Structure
-from discover.learners import RecoveredTerm
+from discover.laws.expansion import law_of_terms
+from discover.laws.textbook.classical import Giesekus
+from discover.learners import LearnerResult, RecoveredTerm
 from discover.summary_view import NotebookView, as_html, table_of
 from tensor_library import LawTerm
 from tensor_library.law_terms import LawTerms
+from tensor_library.sympy_notation import STRESS, Trace
 
 LAW = LawTerms({"sigma.sigma": 0.2, "gammadot": -0.01})
 
@@ -95,3 +100,48 @@ def test_the_path_has_the_best_law_of_each_size_and_a_learner_without_one_empty_
     for table in (without.path_table(), without.inclusion_table()):
         assert table.empty
     assert "sigma.sigma" in without._repr_html_()
+
+
+EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
+
+
+def learned(base=None):
+    terms = (
+        RecoveredTerm("sigma.sigma", 0.25, coefficient_penalised=0.24, ci95=(0.2, 0.3)),
+        RecoveredTerm(EXPONENTIAL, 1.0, inner={"epsilon": 0.5}),
+    )
+    law = law_of_terms(LawTerms.of(terms), True, base)
+    return LearnerResult("tensor_sindy", law, terms, 1.0, {}, "ended <b>well</b>")
+
+
+def test_the_sympy_form_is_the_extra_term():
+    wanted = 0.25 * STRESS**2 + (sympy.exp(0.5 * Trace(STRESS)) - 1) * STRESS
+    assert sympy.expand(learned().sympy() - wanted) == 0
+
+
+def test_the_table_has_a_line_for_each_term_with_its_interval():
+    table = learned().table()
+    assert table["term"].tolist() == ["sigma.sigma", EXPONENTIAL]
+    assert table.loc[0, ["low", "high"]].tolist() == [0.2, 0.3]
+    assert np.isnan(table.loc[1, "low"])
+    assert table.loc[1, "inner"] == "epsilon = 0.5"
+
+
+def test_a_notebook_shows_equation_and_table_and_escapes_text():
+    shown = learned()._repr_html_()
+    assert "<math" in shown
+    assert "<table" in shown
+    assert "<b>well</b>" not in shown
+    assert r"\epsilon = 0.5" in learned().latex()
+
+
+def test_the_equation_holds_the_known_law_below():
+    equation = learned(Giesekus(0.1)).equation()
+    found = {t.term: t.coefficient for t in equation.terms}
+    assert abs(found["sigma.sigma"] - 0.35) < 1e-12
+    stress, rate = jnp.asarray([0.3, 0.1, -0.1, 0.5]), jnp.asarray([0.0, 0.0, 0.0, 1.0])
+    np.testing.assert_allclose(
+        equation.law().extra_term(stress, rate),
+        learned(Giesekus(0.1)).law.extra_term(stress, rate),
+        rtol=1e-12,
+    )

@@ -31,9 +31,7 @@ with Path(__file__).with_name("recorded_loops.csv").open(encoding="utf-8", newli
 
 @pytest.mark.parametrize("crowding", [1.0, 8.0])
 @pytest.mark.parametrize("name", RECORDED)
-def test_the_bar_of_recorded_loops_is_off_by_an_eighth_at_most_and_the_time_left_by_1_65(
-    name, crowding
-):
+def test_the_bar_of_recorded_loops_is_off_by_an_eighth_and_time_left_by_1_65(name, crowding):
     now, told, checked = 0.0, [], 0
     runs = int(re.search(r"(\d+) runs", name)[1])
     without = "none held out" in name

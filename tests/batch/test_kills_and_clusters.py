@@ -180,9 +180,7 @@ def is_running(pid):
 
 
 @pytest.mark.slow
-def test_workers_end_with_a_command_that_is_killed_and_leave_no_folder_locked(
-    studies, calm, tmp_path
-):
+def test_workers_end_with_a_killed_command_and_leave_no_folder_locked(studies, calm, tmp_path):
     out = tmp_path / "out"
     arguments = ["batch", *map(str, studies), "--out", str(out), "--workers", "2", "--quiet"]
     process = subprocess.Popen(
@@ -301,9 +299,7 @@ def strange(tmp_path):
     return [odd, broken]
 
 
-def test_a_name_that_is_no_utf_8_costs_no_study_its_place_and_one_worker_is_no_process(
-    studies, strange, tmp_path
-):
+def test_a_name_that_is_no_utf_8_costs_none_and_one_worker_no_process(studies, strange, tmp_path):
     out = tmp_path / "out"
     result, started, ports = looked_at([*studies[:1], *strange], out, 1)
     assert [s.status for s in result.studies] == ["done", "done", "failed"]
@@ -327,9 +323,7 @@ def dying_workers(tmp_path, monkeypatch, deaths):
     monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
 
 
-def test_workers_open_no_port_and_one_killed_while_it_starts_costs_no_study_its_place(
-    studies, strange, calm, tmp_path, monkeypatch
-):
+def test_workers_open_no_port_and_may_die_at_start(studies, strange, calm, tmp_path, monkeypatch):
     dying_workers(tmp_path, monkeypatch, 1)
     result, started, ports = looked_at([*studies, *strange], tmp_path / "out", 2)
     assert [s.status for s in result.studies] == ["done"] * 3 + ["failed", "done", "failed"]
@@ -347,9 +341,7 @@ def test_many_workers_killed_while_they_start_are_told(studies, tmp_path, monkey
     assert all(s.text.startswith("Several workers died") for s in result.studies)
 
 
-def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
-    studies, tmp_path, monkeypatch
-):
+def test_a_study_that_kills_every_worker_is_given_up_alone(studies, tmp_path, monkeypatch):
     # as soon as it is handed the study, and of the first before the worker has imported anything
     fatal = (
         "import os, signal, sys\n"

@@ -8,11 +8,10 @@ import zlib
 
 import numpy as np
 import pytest
+from command_line import invoke
 from fewer_hypotheses import few_candidates, verdict_alone
 from made_exports import write_runs
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.compilation_cache import enable_compilation_cache, remove_cut_short
 from discover.learners import LearnerResult, RecoveredTerm
 
@@ -35,12 +34,6 @@ library = { degree = 0 }
 high_deborah = [1.5]
 next = { weissenberg_numbers = [1.0], deborah_numbers = [1.0] }
 """
-
-
-def invoke(*arguments, code=None):
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert code is None or done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture
@@ -104,9 +97,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
     assert "--overwrite" in other.stderr
 
 
-def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
-    tmp_path, monkeypatch, trained, undrawn
-):
+def test_an_interrupted_run_says_so_and_goes_on_quietly(tmp_path, monkeypatch, trained, undrawn):
     from discover.comparison import learning as module
 
     known, kept = module.train, tmp_path / "out" / "state" / "tensor_sindy.json"
@@ -261,9 +252,7 @@ def test_a_folder_in_place_of_a_study_is_answered_with_a_study(tmp_path):
     assert "melt.toml" in meant.stderr
 
 
-def test_whole_programs_are_left_broken_ones_go_and_nothing_is_kept_where_the_user_says_so(
-    tmp_path, monkeypatch
-):
+def test_broken_programs_go_and_none_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
     whole = zlib.compress(b"program " * 1000)
     contents = {"jit_a": whole, "jit_b": whole[:-3], "jit_c": b"", "jit_d": b"nonsense"}
     for name, content in contents.items():

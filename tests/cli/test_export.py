@@ -8,9 +8,8 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
-from discover.cli import app
 from discover.effects import make_effect
 from discover.equations import AugmentedLaw, Box, Equation, StatePart, equation_to_json
 from discover.equations import Tested as Where
@@ -19,12 +18,6 @@ from discover.laws import Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
 from discover.loop.parts import ConstantByMode, DeclaredEffect, ModeConstant, NearestLaw
 from tensor_library import LawTerm
-
-
-def invoke(*arguments, code=None):
-    done = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert code is None or done.exit_code == code, done.output
-    return done
 
 
 def module_at(path):
@@ -48,9 +41,7 @@ def results(tmp_path):
     return tmp_path / "out"
 
 
-def test_a_comparison_becomes_a_function_that_says_where_it_was_tested_and_replaces_no_result(
-    results, tmp_path
-):
+def test_a_comparison_becomes_a_function_with_its_tests_and_replaces_no_result(results, tmp_path):
     invoke("export", results, "--out", tmp_path / "law.py", code=0)
     module = module_at(tmp_path / "law.py")
     assert module.TESTED["judged_in"] == {"Wi": [2.0, 3.0], "De": [0.1, 1.5]}
@@ -181,9 +172,7 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
         pytest.param("non_affine_motion", "zeta", "johnson_segalman", marks=pytest.mark.slow),
     ],
 )
-def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_that_law_in_rheotool(
-    tmp_path, effect, entry, law
-):
+def test_an_effect_by_mode_is_the_law_that_it_makes_in_rheotool(tmp_path, effect, entry, law):
     found = DeclaredEffect(effect, "constitutive", {"amplitude": by_mode((0.1, 0.3))})
     result = loop_result((effect, 0.1), base=("ucm", {}), declared_effects=(found,))
     result.write_json(tmp_path / "loop.json")
@@ -196,9 +185,7 @@ def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_that_law_in_rheotool(
     assert read_result_laws(tmp_path)["augmented"].named.law == law
 
 
-def test_a_constant_by_mode_beyond_its_range_by_a_rounding_is_at_its_end_and_beside_terms_refused(
-    tmp_path,
-):
+def test_a_constant_by_mode_ends_at_its_range_and_is_refused_beside_terms(tmp_path):
     differing = {"alpha": by_mode((0.1, np.nextafter(1.0, 2.0)))}
     named = loop_result(declared_parameters=differing).equation().named
     assert [one["alpha"] for one in named.constants] == [0.1, 1.0]
@@ -234,9 +221,7 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
     assert "cannot be exported to rheoTool: it has a structure" in refused.stderr
 
 
-def test_the_nearest_classical_law_stands_in_the_result_and_is_exported_in_place_of_the_answer(
-    tmp_path,
-):
+def test_the_nearest_classical_law_is_exported_in_place_of_the_answer(tmp_path):
     equation = loop_result(base=("giesekus", {"alpha": 0.137})).equation()
     near = NearestLaw("giesekus", {"alpha": StageParameter(0.1, (0.05, 0.2), "1")}, 0.12, equation)
     replace(loop_result(("yield_stress", 0.1)), nearest_law=near).write_json(tmp_path / "loop.json")
@@ -281,9 +266,7 @@ def entries(text):
         ("power_law", {"consistency_Pa_sn": 5.0, "flow_index": 0.5}, "PowerLaw", 10.0),
     ],
 )
-def test_a_fluid_without_elasticity_leaves_with_its_constants_size_and_range(
-    tmp_path, law, constants, kind, stress
-):
+def test_an_inelastic_fluid_leaves_with_constants_and_range(tmp_path, law, constants, kind, stress):
     folder = result(tmp_path / "out", law, constants)
     text = invoke("export", folder, "--format", "rheotool", "--density", "1050").stdout
     found = entries(text)

@@ -171,9 +171,7 @@ def curve(material):
     ],
     ids=["creep", "flow curve"],
 )
-def test_a_test_of_another_kind_held_out_judges_what_two_start_ups_give(
-    law, other, quantity, of, own
-):
+def test_a_test_of_another_kind_judges_what_two_start_ups_give(law, other, quantity, of, own):
     judge = of(law if own else other)
     found = compared([start(law, 1.0), start(law, 3.0), judge], base_of(law), held_out=[judge.name])
     assert found.verdict == ("explained" if own else "unexplained")

@@ -1,23 +1,22 @@
 """A known instrument is taken out of the records; what cannot be is refused in words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation, start_up
-from independent.flow import of_rate
-from independent.noise import white
-from noisy_runs import run_at
-from scipy.signal import lfilter
+from independent import Giesekus, start_up
+from independent.instruments import Instrument
+from noisy_runs import run_at, waves
 
 from discover.comparison import compare
 from discover.comparison.in_memory import compare as compare_in_memory
 from discover.comparison.known_part import known_part, without_instrument
-from discover.dataset import Dataset, Run
+from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.loop.loop import search
 from discover.loop.task import Task
-from discover.protocols import oscillatory_shear
 from discover.simulate import simulate
 from discover.study import RunFolder, parse_study
 from discover.study.data import StudyData
@@ -29,27 +28,18 @@ MOBILITY, NOISE = 0.3, 0.01
 
 def oscillations(gain: float, offset: float = 0.0) -> Dataset:
     """Return four oscillations whose stress is recorded with a gain, in 1 % noise."""
-    times = np.linspace(0.0, 16.0, 81)
-    rng, runs = np.random.default_rng(0), []
-    for amplitude, frequency in ((1.0, 0.5), (2.0, 0.5), (1.0, 1.0), (2.0, 1.0)):
-        flow = oscillation(amplitude, frequency)
-        stress = gain * Giesekus(MOBILITY).respond(flow, times).sigma12 + offset
-        recorded = white(stress, NOISE, rng)
-        protocol = oscillatory_shear(amplitude, frequency)
-        name = f"Wi {amplitude:g}, De {frequency:g}"
-        runs.append(Run(name, times, protocol, np.asarray(flow.rate(times)), recorded))
-    return Dataset("planted", tuple(runs))
+    pairs, times = ((1.0, 0.5), (2.0, 0.5), (1.0, 1.0), (2.0, 1.0)), np.linspace(0.0, 16.0, 81)
+    data = waves(Giesekus(MOBILITY), pairs, times, NOISE, factor=gain)
+    return Dataset("planted", tuple(replace(run, stress=run.stress + offset) for run in data))
 
 
-def slow_start_ups(rise_time: float, noise: float = 0.0) -> Dataset:
-    """Return start-ups of a motor that needs time, with the commanded rate as what is known."""
-    times = np.geomspace(0.02, 8.0, 40)
-    rng, runs = np.random.default_rng(1), []
+def start_ups(instrument: Instrument) -> Dataset:
+    """Return start-ups as recorded, with the commanded rate as what is known."""
+    times, runs = np.geomspace(0.02, 8.0, 40), []
     for rate in (0.5, 2.0):
-        felt = of_rate(lambda t, r=rate: r * -np.expm1(-np.asarray(t) / rise_time), 8.0)
-        stress = Giesekus(MOBILITY).respond(felt, times).sigma12
-        runs.append(run_at(rate, times, white(stress, noise, rng)))
-    return Dataset("slow motor", tuple(runs))
+        recorded = instrument.record(Giesekus(MOBILITY), start_up(rate), times)
+        runs.append(run_at(rate, times, recorded.stress))
+    return Dataset("slow", tuple(runs))
 
 
 GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": MOBILITY}))
@@ -73,29 +63,15 @@ def taken(data, effects):
     return known_part(declared, search(task).ended(), divided(data), (), ())
 
 
-def lagging(tau):
-    """Return start-ups read by a transducer whose answer lags behind by a time."""
-    fine, times = np.linspace(0.0, 8.0, 8001), np.geomspace(0.02, 8.0, 40)
-    kept, runs = np.exp(-fine[1] / tau), []
-    for rate in (0.5, 2.0):
-        stress = Giesekus(MOBILITY).respond(start_up(rate), fine).sigma12
-        read = lfilter([0.5 * (1.0 - kept)] * 2, [1.0, -kept], stress)
-        runs.append(run_at(rate, times, np.interp(times, fine, read)))
-    return Dataset("slow transducer", tuple(runs))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("make", "effect"),
-    [
-        (lambda: slow_start_ups(rise_time=0.2), {"rate_rise_time": {"tau": 0.2}}),
-        (lambda: lagging(0.2), {"transducer_lag": {"tau": 0.2}}),
-    ],
+    ("instrument", "effect"),
+    [(Instrument(rise_time=0.2), "rate_rise_time"), (Instrument(lag=0.2), "transducer_lag")],
     ids=["motor", "transducer"],
 )
-def test_what_a_slow_motor_or_transducer_did_is_taken_out(make, effect):
-    data = make()
-    for found, limit in ((taken_out(data, effect)[0].fit, 3e-3), (data, 0.1)):
+def test_what_a_slow_motor_or_transducer_did_is_taken_out(instrument, effect):
+    data = start_ups(instrument)
+    for found, limit in ((taken_out(data, {effect: {"tau": 0.2}})[0].fit, 3e-3), (data, 0.1)):
         worst = 0.0
         for run in found:
             stress = simulate(GIESEKUS, run.protocol, run.time).shear_stress
@@ -153,13 +129,10 @@ def test_an_effect_of_no_size_is_none_and_refused_by_nobody():
     assert taken(oscillations(gain=1.0), effects).effects == ()
 
 
-DETAILS = {"rivals": [], "n_independent": 50.0}
-
-
 def trained(learner, study, model, runs, seed=0, progress=None, library=None):
     law = make_law("giesekus", {"alpha": MOBILITY})
     term = RecoveredTerm("sigma.sigma", MOBILITY, coefficient_penalised=MOBILITY, ci95=(0.29, 0.31))
-    result = LearnerResult(learner, law, (term,), 1.5, DETAILS, "fake")
+    result = LearnerResult(learner, law, (term,), 1.5, {"rivals": []}, "fake")
     return result, Fluid(law, model.modulus, model.relaxation_time)
 
 
@@ -190,9 +163,7 @@ def with_gain(weak, folder):
 
 
 @pytest.mark.slow
-def test_both_learners_see_the_records_without_the_gain_and_what_was_kept_gives_the_same(
-    weak, with_gain, folder
-):
+def test_both_learners_see_records_without_the_gain_and_resume_the_same(weak, with_gain, folder):
     known = compared(weak, effects={"stress_gain": {"gain_error": -0.1}})
     for found in (with_gain, known):
         for name in ("tensor_sindy", "tbnn_ude"):

@@ -3,10 +3,14 @@
 What is compared went through text and units.
 """
 
-import numpy as np
-from typer.testing import CliRunner
+from pathlib import Path
+from typing import NamedTuple
 
-from discover.cli import app
+import numpy as np
+from click.testing import Result
+from command_line import invoke
+
+from discover.dataset import load_dataset
 
 EXACT = 1e-12  # text of 17 digits; a unit costs a rounding or two
 G, LAMBDA = 100.0, 2.0
@@ -33,6 +37,19 @@ def lines(*columns, mark="\t", comma=False, before=""):
     return [row.replace(".", ",") for row in rows] if comma else rows
 
 
+class Imported(NamedTuple):
+    """The folder that an import made, and what the command said."""
+
+    folder: Path
+    said: Result
+
+    @property
+    def run(self):
+        """The one run of the folder."""
+        (run,) = load_dataset(self.folder)
+        return run
+
+
 def imported(tmp_path, name, rows, *options, encoding="utf-8", code=0):
     path = tmp_path / name
     path.write_bytes("\r\n".join(rows).encode(encoding))
@@ -41,10 +58,7 @@ def imported(tmp_path, name, rows, *options, encoding="utf-8", code=0):
 
 def run(tmp_path, *arguments, code=0):
     out = tmp_path / "data"
-    words = ["data", "import", *map(str, arguments), "--out", str(out), "--no-page"]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == code, result.output
-    return out, result
+    return Imported(out, invoke("data", "import", *arguments, "--out", out, "--no-page", code=code))
 
 
 def csv(table):

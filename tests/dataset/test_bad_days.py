@@ -7,11 +7,10 @@ import os
 
 import numpy as np
 import pytest
+from command_line import invoke
 from harm import SANE
 from made_exports import write_files
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.dataset import check_folder, load_dataset
 from discover.errors import InputError
 from discover.study import fingerprint, read_study
@@ -139,9 +138,7 @@ def test_what_users_bring_is_refused_with_file_place_and_remedy(tmp_path, name, 
     message = use(tmp_path)
     assert words in message
     assert any(file in message for file in (name, "missing.csv"))
-    result = CliRunner().invoke(app, ["data", "check", str(tmp_path)])
-    assert result.exit_code == 2
-    assert words in result.output
+    assert words in invoke("data", "check", tmp_path, code=2).output
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,9 @@ import zipfile
 import numpy as np
 import openpyxl
 import pytest
+from command_line import invoke
 from made_exports import EXACT, OMEGA, TIMES, assert_sweep, imported, lines, moduli, run
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.dataset import load_dataset
 
 SHEET = (
@@ -116,10 +115,8 @@ def test_an_import_does_not_write_over_the_export_that_it_reads(tmp_path, name, 
     path = tmp_path / name
     path.write_text("\n".join(SWEEP if name == "lve.csv" else START))
     before = path.read_bytes()
-    words = ["data", "import", str(path), "--out", str(tmp_path), "--no-page", *further]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 2, result.output
-    assert "--out" in result.stderr
+    done = invoke("data", "import", path, "--out", tmp_path, "--no-page", *further, code=2)
+    assert "--out" in done.stderr
     assert path.read_bytes() == before
     assert {one.name for one in tmp_path.iterdir()} == {name}
 
@@ -156,13 +153,11 @@ def test_a_temperature_is_given_for_each_file_or_block_and_a_mapping_keeps_it(tm
     options = "--temperature", "a.csv=20", "--temperature", "b.csv:1=333.15K", "--overwrite"
     out, _ = run(tmp_path, *files, *options)
     assert_sweep(out / "lve_60C.csv", shift=0.1)
-    again = CliRunner().invoke(
-        app, ["data", "import", "--mapping", str(out / "import.toml"), "--no-page",
-              "--out", str(tmp_path / "again")]
-    )  # fmt: skip
-    assert again.exit_code == 0, again.output
-    assert_sweep(tmp_path / "again" / "lve_20C.csv")
-    assert_sweep(tmp_path / "again" / "lve_60C.csv", shift=0.1)
+    again = tmp_path / "again"
+    mapping = "--mapping", out / "import.toml"
+    invoke("data", "import", *mapping, "--no-page", "--out", again, code=0)
+    assert_sweep(again / "lve_20C.csv")
+    assert_sweep(again / "lve_60C.csv", shift=0.1)
 
 
 def test_what_may_be_a_molar_mass_or_a_ramp_is_no_temperature(tmp_path):

@@ -64,7 +64,8 @@ def test_the_code_page_of_the_country_is_found_from_the_names(tmp_path, language
     [
         ("shear_rate", "ɣ̇§γ̇§γ ̇§γ˙§ẏ§γ_dot§gamma_dot§GammaDot§gammadot§gdot§$\\dot{\\gamma}$§dγ/dt§"
                        "ShearRate§StrainRate§S. Rate§SHEAR_RATE§Ｓｈｅａｒ　Ｒａｔｅ"),
-        ("strain", "ɣ§γ§Gamma§Shear Strain§ShearStrain"),
+        ("strain", "ɣ§γ§Gamma§Shear Strain§ShearStrain§Déformation de Cisaillement"),
+        ("step_time", "Intervalle Temps"), ("temperature", "Température"),
         ("stress", "τ§Tau§sigma_xy§σ₁₂§ShearStress§Shear stress τ§S. Stress"),
         ("Gp", "G'§G′§G’§G´§Storage mod.§StorageModulus§Storage modulus (G')§GPrime"),
         ("Gpp", "G''§G″§G\"§G′′§G’’§Loss mod.§LossModulus§Loss modulus G″"),

@@ -142,8 +142,7 @@ def test_torque_and_speed_become_stress_and_rate_by_geometry(tmp_path, tool):
     speed = np.full(40, RATE / strain * 60 / (2 * math.pi))
     rows += lines(TIMES, STRESS / stress * 1e6, speed, NORMAL * math.pi * radius**2 / 2, mark=",")
     imported(tmp_path, "a.csv", rows, code=2)
-    out, _ = imported(tmp_path, "a.csv", rows, "--geometry", option)
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "a.csv", rows, "--geometry", option).run
     cone = tool == "cone_plate"
     assert_equals_original(test, normal=cone)
     assert (test.first_normal_stress_difference is not None) is cone

@@ -115,22 +115,6 @@ def test_german_rheocompass_with_waveforms_gives_the_sweep_and_the_waves(tmp_pat
     assert "periodic steady state" in result.stdout
 
 
-def test_french_names_are_known(tmp_path):
-    names = ["Interval données:", "Point No.", "Intervalle Temps", "Déformation de Cisaillement"]
-    names += ["Contrainte de Cisaillement", "Température"]
-    rows = ["\t".join(names), "", "\t\t[s]\t[%]\t[mPa]\t[°C]"]
-    decay = G * np.exp(-TIMES / LAMBDA)
-    columns = TIMES, np.full(30, 5.0), 50.0 * decay, np.full(30, 25.0)
-    for i, row in enumerate(lines(*columns, comma=True), start=1):
-        rows.append(f"\t{i}\t{row}")
-    out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
-    (test,) = load_dataset(out)
-    assert float(test.metadata["step_strain"]) == 0.05
-    assert test.metadata["temperature_C"] == 25.0
-    np.testing.assert_allclose(test.stress, 0.05 * decay, rtol=EXACT)
-    assert "relaxation after a step of strain" in result.stdout
-
-
 def test_actions_of_rspace_are_told_apart_by_their_name_in_the_first_column(tmp_path):
     head = "Action Name;Time (action)(s);Shear stress(Pa);Shear rate(s-¹);Complex shear strain(%);"
     head += "Frequency(Hz);Shear modulus (elastic component)(Pa);"
@@ -153,11 +137,11 @@ def test_segments_of_rheowin_are_told_apart_by_their_number(tmp_path):
         rows.append(f"1|{n};{t!r};0.15;{s!r};25.0")
     for n, r in enumerate(RATES.tolist(), start=1):
         rows.append(f"2|{n};{10 * n};{r!r};{3 * r!r};25.0")
-    out, _ = imported(tmp_path, "a.csv", rows, encoding="cp1252")
-    (test,) = load_dataset(out)
+    made = imported(tmp_path, "a.csv", rows, encoding="cp1252")
+    test = made.run
     np.testing.assert_allclose(test.stress, start, rtol=EXACT)
     np.testing.assert_allclose(test.rate, 0.15)
-    assert len(table(out / "flow_curve.csv")["stress_Pa"]) == 11
+    assert len(table(made.folder / "flow_curve.csv")["stress_Pa"]) == 11
 
 
 def test_files_of_reptate_are_what_their_suffix_says(tmp_path):
@@ -211,8 +195,7 @@ def test_a_rate_that_alternates_is_not_taken_for_a_strain_without_a_name(tmp_pat
     time = np.linspace(0.0, 12.0, 300)
     stress = (np.cos(time) + np.sin(time) - np.exp(-time)) * G / 2  # from rest, Maxwell, De = 1
     rows = ["time_s,shear_rate_1_s,stress_Pa", *lines(time, np.cos(time), stress, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "a.csv", rows).run
     np.testing.assert_allclose(test.rate, np.cos(time), rtol=EXACT)
     assert "start" not in test.metadata
 
@@ -238,8 +221,7 @@ def test_a_sine_of_stress_is_imposed_and_its_start_is_seen_in_the_strain(tmp_pat
     if at_rest:
         strain += 0.3 * np.exp(-time / 5.0)  # what starts from zero and fades
     rows = ["time_s,stress_Pa,strain", *lines(time, np.sin(time), strain, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "a.csv", rows).run
     assert test.protocol.control == "stress"
     assert ("start" in test.metadata) is not at_rest
 
@@ -289,8 +271,7 @@ def test_creep_and_the_recovery_after_it_are_one_run(tmp_path):
         ("Creep - 1", {"Step time": TIMES, "Stress": TIMES * 0 + 50.0, "Strain": rise * 100}),
         ("Recovery - 2", {"Step time": TIMES, "Stress": TIMES * 0 + 1e-4, "Strain": fall * 100}),
     )
-    out, _ = imported(tmp_path, "a.txt", made)
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "a.txt", made).run
     assert test.protocol.control == "stress"
     np.testing.assert_allclose(test.strain, np.concatenate([rise, fall]), rtol=EXACT)
     np.testing.assert_allclose(test.time[30:], 10.0 + TIMES, rtol=EXACT)
@@ -308,8 +289,7 @@ def test_the_rise_of_a_step_of_strain_is_told_from_what_follows(tmp_path):
     strain = np.concatenate([[0.0, 33.0, 66.0], np.full(30, 100.0)])
     stress = G * np.concatenate([[0.0, 0.33, 0.66], np.exp(-TIMES / LAMBDA)])
     made = steps(("Stress relaxation", {"Step time": time, "Strain": strain, "Stress": stress}))
-    out, _ = imported(tmp_path, "a.txt", made)
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "a.txt", made).run
     assert float(test.metadata["step_strain"]) == 1.0
     # the first sample at full strain ends the step
     assert float(test.metadata["step_time_s"]) == 0.04

@@ -115,9 +115,7 @@ def test_steady_alternation_goes_back_by_whole_cycles_of_the_record_and_needs_on
         load_dataset(folder(tmp_path / "melt", "file,start", "a.csv,periodic"))
 
 
-def test_what_is_declared_as_it_is_taken_is_used_and_a_rate_under_imposed_stress_is_measured(
-    tmp_path,
-):
+def test_what_is_declared_is_used_and_a_rate_under_imposed_stress_is_measured(tmp_path):
     header = "file,flow,control,start,step_strain,temperature_C"
     made = folder(tmp_path / "melt", header, "a.csv,shear,rate,rest,,25", "b.csv,,,,,")
     data = load_dataset(made)

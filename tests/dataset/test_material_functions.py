@@ -43,9 +43,7 @@ def test_a_folder_of_one_table_is_a_data_set_which_is_fitted_of_a_sweep_both_mod
     assert data_in_memory(load_dataset(folder)).fit.names == data.fit.names
 
 
-def test_tables_are_sorted_and_converted_and_linear_ones_are_looked_at_where_they_are_linear(
-    tmp_path,
-):
+def test_tables_are_sorted_and_converted_and_linear_ones_kept_at_small_strain(tmp_path):
     run = load_dataset(write_files(tmp_path, SWEEPS)).material_functions["amplitude_sweep"]
     storage, loss = run.records
     np.testing.assert_allclose(run.strain, [0.01, 1.0])
@@ -250,9 +248,7 @@ def independent(sweep, found):
     return left * np.diag(np.linalg.inv(design.T @ design))
 
 
-def test_intervals_hold_though_the_strain_was_not_small_and_noise_widens_nothing(
-    at_a_strain_of_one,
-):
+def test_intervals_hold_at_a_strain_that_is_not_small_and_noise_widens_none(at_a_strain_of_one):
     for seed in range(3):
         sweep = noisy(at_a_strain_of_one, 0.01, seed)
         found = relaxation_spectrum(sweep)

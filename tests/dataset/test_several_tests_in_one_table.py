@@ -88,34 +88,53 @@ def test_columns_that_are_counted_are_runs_which_may_differ_in_length(tmp_path, 
     np.testing.assert_allclose(second.stress, start_up(2.0)[:20], rtol=EXACT)
 
 
-def test_a_quantity_that_stands_in_a_table_twice_makes_no_second_test(tmp_path):
-    rows = ["Time (s),Temperature (°C),Shear rate (1/s),Temperature (°C),Stress (Pa)"]
-    still = np.full(30, 25.0)
-    columns = TIMES, still, np.full(30, 0.5), still + 0.1, start_up(0.5)
-    out, _ = imported(tmp_path, "a.csv", rows + lines(*columns, mark=","))
-    assert_start_ups(out, ("a.csv",), (0.5,))
-
-
 def stacked(*parts):
     return np.concatenate([np.stack(np.broadcast_arrays(*part), 1) for part in parts]).T
 
 
-def test_runs_below_each_other_are_told_by_their_clock_that_starts_again(tmp_path):
-    columns = stacked(*((TIMES, rate, start_up(rate)) for rate in (0.5, 2.0)))
-    rows = ["Time (s),Shear rate (1/s),Stress (Pa)", *lines(*columns, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
-    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+def in_turn(columns):
+    return columns[:, np.argsort(columns[0], kind="stable")]
+
+
+TWO = stacked(*((TIMES, rate, start_up(rate)) for rate in (0.5, 2.0)))
+SET = stacked(*((TIMES, rate, rate, start_up(rate)) for rate in (0.5, 2.0)))
+# samples A and B
+SAMPLES = stacked(*((TIMES, name, rate, start_up(rate)) for name, rate in ((7, 0.5), (8, 2.0))))
+# head, columns, and what is said; of what has the name of a sample, not what stands before it
+TOLD_APART = {
+    "by a clock that starts again": (
+        "Time (s),Shear rate (1/s),Stress (Pa)", TWO, "Shear rate 0.5 1/s"
+    ),
+    "row by row, by a set rate": (
+        "Time (s),Set rate (1/s),Shear rate (1/s),Stress (Pa)", in_turn(SET), "Set rate 0.5 1/s"
+    ),
+    "by a column of samples": ("Time (s),Sample,Shear rate (1/s),Stress (Pa)", SAMPLES, ""),
+    "row by row, by a column of samples": (
+        "Time (s),Sample,Shear rate (1/s),Stress (Pa)", in_turn(SAMPLES), ""
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", TOLD_APART)
+def test_runs_below_each_other_or_in_turn_are_told_apart(tmp_path, case):
+    head, columns, words = TOLD_APART[case]
+    rows = [
+        row.replace(",7.0,", ",A,").replace(",8.0,", ",B,") for row in lines(*columns, mark=",")
+    ]
+    out, result = imported(tmp_path, "a.csv", [head, *rows])
+    told = ("a-1.csv", "a-2.csv"), (0.5, 2.0)
+    assert_start_ups(out, *told)
+    assert words in result.stdout
+    assert words or "stands before it" not in result.stdout
     again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
-    assert_start_ups(again, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+    assert_start_ups(again, *told)
 
 
-def test_runs_row_by_row_in_turn_are_told_by_their_set_rate(tmp_path):
-    columns = stacked(*((TIMES, rate, rate, start_up(rate)) for rate in (0.5, 2.0)))
-    columns = columns[:, np.argsort(columns[0], kind="stable")]
-    rows = ["Time (s),Set rate (1/s),Shear rate (1/s),Stress (Pa)", *lines(*columns, mark=",")]
-    out, result = imported(tmp_path, "a.csv", rows)
-    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
-    assert "Set rate 0.5 1/s" in result.stdout
+def test_a_quantity_that_stands_in_a_table_twice_makes_no_second_test(tmp_path):
+    rows = ["Time (s),Temperature (°C),Shear rate (1/s),Temperature (°C),Stress (Pa)"]
+    columns = TIMES, np.full(30, 25.0), np.full(30, 0.5), np.full(30, 25.1), start_up(0.5)
+    out, _ = imported(tmp_path, "a.csv", rows + lines(*columns, mark=","))
+    assert_start_ups(out, ("a.csv",), (0.5,))
 
 
 def test_a_clock_that_goes_on_through_steps_of_rate_is_one_run(tmp_path):
@@ -126,22 +145,10 @@ def test_a_clock_that_goes_on_through_steps_of_rate_is_one_run(tmp_path):
     assert len(load_dataset(out)["a.csv"].time) == 90
 
 
-@pytest.mark.parametrize("in_turn", [False, True])
-def test_a_column_of_samples_keeps_them_apart(tmp_path, in_turn):
-    rows = [f"{t!r},{name},{rate},{s!r}" for name, rate in (("A", 0.5), ("B", 2.0))
-            for t, s in zip(TIMES.tolist(), start_up(rate).tolist(), strict=True)]  # fmt: skip
-    rows = sorted(rows, key=lambda row: float(row.split(",")[0])) if in_turn else rows
-    head = "Time (s),Sample,Shear rate (1/s),Stress (Pa)"
-    out, result = imported(tmp_path, "a.csv", [head, *rows])
-    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
-    assert "stands before it" not in result.stdout
-
-
-@pytest.mark.parametrize("in_turn", [False, True])
-def test_flow_curves_at_two_temperatures_are_two(tmp_path, in_turn):
+@pytest.mark.parametrize("mixed", [False, True])
+def test_flow_curves_at_two_temperatures_are_two(tmp_path, mixed):
     columns = stacked((RATES, 3.0 * RATES, 20.1), (RATES, 0.3 * RATES, 60.0))
-    if in_turn:
-        columns = columns[:, np.argsort(columns[0], kind="stable")]
+    columns = in_turn(columns) if mixed else columns
     rows = ["shear_rate_1_s,stress_Pa,temperature_C", *lines(*columns, mark=",")]
     out, _ = imported(tmp_path, "a.csv", rows)
     for degrees, factor in (("20.1", 3.0), ("60", 0.3)):
@@ -225,8 +232,7 @@ def test_a_file_of_reptate_may_lack_its_first_line_and_have_more_columns(tmp_pat
     x = np.linspace(0.0, 4 * np.pi, 200)
     wave = x, 2 * np.sin(x), 3 * np.sin(x + 0.5), 1 - np.cos(2 * x)
     rows = ["omega=1.0;gamma=2.0;", "#Time(s)\tStrain(-)\ttau_yx(Pa)\ttau_xx-tau_yy(Pa)"]
-    out, _ = imported(tmp_path, "b.laos", rows + lines(*wave), "--overwrite")
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "b.laos", rows + lines(*wave), "--overwrite").run
     found = test.first_normal_stress_difference
     np.testing.assert_allclose(found, wave[3], atol=1e-14)
     rows[1] = "#Time(s)\tStrain(-)\ttau_yx(Pa)\tIntensity"

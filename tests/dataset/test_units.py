@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from command_line import invoke
 from made_exports import columns, csv, write_files
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.dataset import check_folder, load_dataset
 from discover.dataset.importing import import_files
 from discover.dataset.importing.mapping import Mapping
@@ -104,8 +103,7 @@ def test_every_conversion_is_said_and_si_units_are_none(tmp_path):
 
 def test_an_import_says_its_conversions(tmp_path):
     (tmp_path / "x.csv").write_text("Time [s],Shear rate [1/s],Stress [kPa]\n" + ROWS)
-    arguments = ["data", "import", str(tmp_path / "x.csv"), "--out", str(tmp_path / "out")]
-    said = CliRunner().invoke(app, arguments).output
+    said = invoke("data", "import", tmp_path / "x.csv", "--out", tmp_path / "out").output
     assert "stress = Stress [kPa] × 1000" in said
     assert "Time [s] ×" not in said
 
@@ -229,9 +227,7 @@ def test_a_viscosity_without_a_unit_is_asked_for_only_where_it_stands_for_the_st
     np.testing.assert_allclose(got["stress_Pa"], STRESS)
 
 
-def test_no_unit_is_asked_of_a_temperature_a_table_of_our_own_or_a_strain_that_is_not_used(
-    tmp_path,
-):
+def test_no_unit_is_asked_of_a_temperature_our_own_table_or_an_unused_strain(tmp_path):
     rate = np.geomspace(1.0, 100.0, 6)
     text = table(T=np.full(6, 25.0), **{"Shear rate": rate, "Stress": STRESS})
     assert "flow_curve.csv" in read(tmp_path, text).files

@@ -47,13 +47,18 @@ def test_a_flow_at_a_given_rate_whose_stress_is_constant_stays_one(tmp_path, whi
     assert load_dataset(out)[0].protocol.control == "rate"
 
 
-@pytest.mark.parametrize("moved", ["strain", "rate"])
-def test_creep_and_recovery_are_one_run_though_their_clock_starts_again(tmp_path, moved):
+@pytest.mark.parametrize(
+    ("moved", "starts", "title"),
+    [
+        ("strain", 0.0, ["Creep and recovery"]), ("rate", 0.0, ["Creep and recovery"]),
+        ("strain", 0.0, []), ("strain", 10.0, []),
+    ],
+)  # fmt: skip
+def test_creep_and_recovery_are_one_run_whatever_their_clock(tmp_path, moved, starts, title):
     strain, rate = np.append(CREEP, RECOVERY), np.append(RATE, -0.2 * np.exp(-TIMES))
-    columns = {"Time [s]": np.append(TIMES, TIMES), "Stress [Pa]": np.append(HELD, NONE)}
+    columns = {"Time [s]": np.append(TIMES, starts + TIMES), "Stress [Pa]": np.append(HELD, NONE)}
     columns |= {"Strain [-]": strain} if moved == "strain" else {"Shear rate [1/s]": rate}
-    out, _ = export(tmp_path, columns, "Creep and recovery")
-    (test,) = load_dataset(out)
+    test = export(tmp_path, columns, *title).run
     np.testing.assert_allclose(test.time[30:], 10.0 + TIMES, rtol=1e-12)
     assert test.protocol.control == "stress"
     assert np.all(test.stress[30:] == 0.0)
@@ -62,16 +67,6 @@ def test_creep_and_recovery_are_one_run_though_their_clock_starts_again(tmp_path
     else:  # it goes back by 0.2 (1 - exp(-t)), and starts at the last strain of the creep
         back = test.recorded[30:] - test.recorded[29]
         np.testing.assert_allclose(back[-1], -0.2, rtol=0.03)
-
-
-@pytest.mark.parametrize("starts", [0.0, 10.0])
-def test_creep_and_recovery_without_a_word_are_one_run_at_given_stress(tmp_path, starts):
-    strain = np.append(CREEP, RECOVERY)
-    columns = {"Time [s]": np.append(TIMES, starts + TIMES), "Stress [Pa]": np.append(HELD, NONE)}
-    out, _ = export(tmp_path, columns | {"Strain [-]": strain})
-    (test,) = load_dataset(out)
-    assert test.protocol.control == "stress"
-    np.testing.assert_allclose(test.recorded, strain, rtol=1e-12)
 
 
 RECOVERIES = {
@@ -104,8 +99,7 @@ def test_a_recovered_strain_of_reptate_is_a_recovery_and_a_strain_of_creep_is_no
 def test_what_is_called_a_relaxation_is_one_though_its_strain_is_noisy(tmp_path, title):
     strain = 10.0 * (1 + 0.03 * np.random.default_rng(1).standard_normal(30))
     columns = {"Time [s]": TIMES, "Strain [%]": strain, "Shear stress [Pa]": RELAXED}
-    out, _ = export(tmp_path, columns, title, "Sample: 7")
-    (test,) = load_dataset(out)
+    test = export(tmp_path, columns, title, "Sample: 7").run
     # the median of 30 samples with 3 % of noise has a standard error of 0.7 %
     np.testing.assert_allclose(float(test.metadata["step_strain"]), 0.1, rtol=0.02)
 
@@ -138,8 +132,7 @@ def test_words_and_numbers_that_exclude_each_other_are_one_message(tmp_path, tit
                                    "Relaxation, creep and start-up of a melt",
                                    "Laboratory of extensional rheometry"])  # fmt: skip
 def test_words_that_name_no_test_or_several_leave_numbers_and_columns_to_speak(tmp_path, title):
-    out, _ = export(tmp_path, AT_A_RATE, title)
-    (test,) = load_dataset(out)
+    test = export(tmp_path, AT_A_RATE, title).run
     assert (test.protocol.control, test.flow) == ("rate", "shear")
 
 
@@ -157,9 +150,7 @@ CLOCKED = {
 
 
 @pytest.mark.parametrize("kind", CLOCKED)
-def test_what_stands_in_a_unit_of_time_is_the_time_and_without_one_nothing_is_steady(
-    tmp_path, kind
-):
+def test_what_has_a_unit_of_time_is_the_time_and_without_one_none_is_steady(tmp_path, kind):
     columns = dict(CLOCKED[kind])
     time = columns.pop("Time [s]")
     out, _ = export(tmp_path, {"Clock of the motor [ms]": 1e3 * time, **columns})
@@ -181,8 +172,7 @@ TENSIONS = {
 @pytest.mark.parametrize("case", TENSIONS)
 def test_tension_is_no_shear_whichever_of_its_words_says_so(tmp_path, case):
     above, rate, stress = TENSIONS[case]
-    out, _ = export(tmp_path, {"Time [s]": TIMES, rate: 0 * TIMES + 0.3, stress: STARTED}, *above)
-    (test,) = load_dataset(out)
+    test = export(tmp_path, {"Time [s]": TIMES, rate: 0 * TIMES + 0.3, stress: STARTED}, *above).run
     assert test.flow == "uniaxial"
     np.testing.assert_allclose(test.rate, 0.3)
 
@@ -196,8 +186,7 @@ def test_one_cycle_is_a_cycle_with_its_end_point_and_without(tmp_path, shift, en
         "Shear rate [1/s]": np.cos(phase + shift),
         "Shear stress [Pa]": 50 * np.sin(phase + shift + 0.6) + 5 * np.sin(3 * (phase + shift)),
     }  # fmt: skip
-    out, _ = export(tmp_path, columns)
-    (test,) = load_dataset(out)
+    test = export(tmp_path, columns).run
     assert test.metadata["start"] == "periodic"
     # the period is that of the strain, to what straight lines between 64 samples leave open
     np.testing.assert_allclose(-float(test.protocol.cycle[0]), 2 * np.pi, rtol=1e-3)
@@ -221,10 +210,9 @@ def test_a_loop_is_no_flow_curve_but_a_run_where_its_time_stands(tmp_path, apart
     _, result = export(tmp_path, loop(apart, 0.02), code=2)
     assert "no flow curve of steady states" in result.stderr
     assert "Export it with its time" in result.stderr
-    out, _ = export(tmp_path, {"Time [s]": EVERY_3_S, **loop(apart, 0.02)}, name="b.csv")
-    (test,) = load_dataset(out)
-    np.testing.assert_allclose(test.rate, THERE_AND_BACK)
-    assert not [f for f in check_folder(out) if f.subject == "outliers"]
+    made = export(tmp_path, {"Time [s]": EVERY_3_S, **loop(apart, 0.02)}, name="b.csv")
+    np.testing.assert_allclose(made.run.rate, THERE_AND_BACK)
+    assert not [f for f in check_folder(made.folder) if f.subject == "outliers"]
 
 
 @pytest.mark.parametrize("time", [{}, {"Time [s]": EVERY_3_S}])
@@ -276,8 +264,7 @@ def intervals(*parts):
 @pytest.mark.parametrize("title", [["Test:,3ITT"], []])
 def test_intervals_of_a_thixotropy_test_are_one_run_with_a_word_and_without(tmp_path, title):
     parts = [(STEPS[i], ANSWER[i]) for i in (slice(0, 20), slice(20, 40), slice(40, None))]
-    out, _ = imported(tmp_path, "a.csv", title + intervals(*parts))
-    (test,) = load_dataset(out)
+    test = imported(tmp_path, "a.csv", title + intervals(*parts)).run
     np.testing.assert_allclose(test.time, CLOCK + 2.0)
     np.testing.assert_allclose(test.rate, STEPS)
 

@@ -1,4 +1,4 @@
-"""Documentation: docstrings say shapes and units, the site's links lead somewhere."""
+"""Documentation: docstrings say shapes and units, the site is built and has every name."""
 
 import inspect
 import re
@@ -6,7 +6,6 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
 
 import pytest
 
@@ -99,19 +98,17 @@ ROOT = Path(__file__).parents[2]
 
 
 class Page(HTMLParser):
-    """What a page loads, where its links lead, and the places in it."""
+    """What a page loads, and the places in it."""
 
     def __init__(self, text):
         super().__init__()
-        self.loaded, self.links, self.places = [], [], set()
+        self.loaded, self.places = [], set()
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
         self.places |= {values[key] for key in ("id", "name") if values.get(key)}
-        if tag == "a" and values.get("href"):
-            self.links.append(values["href"])
-        elif tag in ("script", "img", "iframe") and values.get("src"):
+        if tag in ("script", "img", "iframe") and values.get("src"):
             self.loaded.append(values["src"])
         elif tag == "link" and values.get("rel") in ("stylesheet", "icon", "preload", "prefetch"):
             self.loaded.append(values["href"])
@@ -123,38 +120,15 @@ def site(tmp_path_factory):
         pytest.importorskip(name)
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "-q", "-d", str(folder)]
-    subprocess.run(command, cwd=ROOT, check=True)  # strict: a warning is an error
+    # strict, and a link that leads nowhere is a warning: an error
+    subprocess.run(command, cwd=ROOT, check=True)
     pages = {path: Page(path.read_text("utf-8")) for path in folder.rglob("*.html")}
     pages.pop(folder / "404.html")  # written for the root of a server
     return pages
 
 
-def dead_links(pages):
-    """Return the links within the site that lead to no file, or to no place in it."""
-    dead = []
-    for path, page in pages.items():
-        for link in page.links + page.loaded:
-            parts = urlsplit(link)
-            if parts.scheme or parts.netloc:
-                continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-            place = unquote(parts.fragment)
-            in_page = target in pages and place and place not in pages[target].places
-            if not target.is_file() or (in_page and not place.startswith("__")):
-                dead.append((path.name, link))
-    return dead
-
-
-def test_every_link_of_the_site_leads_somewhere_and_one_to_nowhere_is_seen(site, tmp_path):
-    assert len(site) > 30
-    assert not dead_links(site)
-    # control of the test above
-    path = tmp_path / "a.html"
-    path.write_text('<a href="b.html">b</a> <a href="#there">c</a> <p id="here"></p>')
-    assert len(dead_links({path: Page(path.read_text())})) == 2
-
-
 def test_the_site_loads_nothing_from_a_network(site):
+    assert len(site) > 30
     for path, page in site.items():
         assert not [source for source in page.loaded if "//" in source], path.name
 
@@ -169,7 +143,6 @@ def test_every_public_name_and_what_users_hold_of_it_is_in_the_reference(site):
         assert tables.get(name, f"discover.{name}") in places, name
     for name in tensor_library.__all__:
         assert f"tensor_library.{name}" in places, name
-    places = set().union(*(page.places for page in site.values()))
     for learner in ("TensorSINDy", "TBNNUDE"):
         for method in ("fit", "predict", "score", "save", "equation_"):
             assert f"discover.{learner}.{method}" in places

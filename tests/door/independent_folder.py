@@ -1,27 +1,23 @@
 """A data folder of a Giesekus fluid that scipy integrated, in plain numbers."""
 
 import numpy as np
-from independent import Giesekus, start_up
+from independent import Giesekus
+from independent.folders import maxwell_sweep, write_runs, write_table
+from noisy_runs import start_ups
 
 MODULUS, TIME, MOBILITY = 100.0, 2.0, 0.3
 RATES = {"slow.csv": 0.4, "medium.csv": 1.0, "fast.csv": 2.0}
 
 
-def write_folder(folder, samples=40, noise=0.005):
+def write_folder(folder):
     """Write three start-ups and a linear sweep; return the folder."""
-    folder.mkdir()
-    generator = np.random.default_rng(0)
-    times = np.linspace(0.0, 8.0, samples)
-    (folder / "runs.csv").write_text("file\n" + "\n".join(RATES) + "\n")
-    for name, rate in RATES.items():
-        stress = Giesekus(MOBILITY, MODULUS, TIME).respond(start_up(rate), times).sigma12
-        stress += noise * np.sqrt(np.mean(stress**2)) * generator.standard_normal(samples)
-        columns = np.column_stack([times, np.full(samples, rate), stress])
-        header = "time_s,shear_rate_1_s,stress_Pa"
-        np.savetxt(folder / name, columns, delimiter=",", header=header, comments="")
-    omega = np.geomspace(0.005, 50.0, 21)
-    x = omega * TIME
-    sweep = np.column_stack([omega, MODULUS * x**2 / (1 + x**2), MODULUS * x / (1 + x**2)])
-    np.savetxt(folder / "lve.csv", sweep, delimiter=",", header="omega_rad_s,Gp_Pa,Gpp_Pa",
-               comments="")  # fmt: skip
+    fluid, times = Giesekus(MOBILITY, MODULUS, TIME), np.linspace(0.0, 8.0, 40)
+    runs = start_ups(fluid, RATES.values(), times, noise=0.005, names=[*RATES])
+    columns = {
+        run.name: {"time_s": times, "shear_rate_1_s": run.rate, "stress_Pa": run.stress}
+        for run in runs
+    }
+    write_runs(folder, columns, {}, digits=17)
+    sweep = maxwell_sweep([MODULUS], [TIME], np.geomspace(0.005, 50.0, 21))
+    write_table(folder / "lve.csv", sweep, digits=17)
     return folder

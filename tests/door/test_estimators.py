@@ -90,9 +90,7 @@ def test_a_base_is_a_fluid_and_a_bare_run_is_refused_with_what_to_write(data, le
             learner().fit(wrong)
 
 
-def test_an_equation_comes_after_the_fit_and_the_score_is_one_less_the_relative_error(
-    sindy, base, data
-):
+def test_an_equation_comes_after_the_fit_and_a_score_is_one_less_the_error(sindy, base, data):
     equation = sindy.equation_
     assert equation.modulus == tuple(map(float, base.modulus))
     assert r"\sigma" in equation.latex()
@@ -126,9 +124,7 @@ def test_an_estimator_is_the_same_after_every_way(which, request, data, tmp_path
     assert len(repr(fitted)) < 1000
 
 
-def test_a_file_holds_plain_json_and_what_it_cannot_hold_is_said_and_leaves_the_old(
-    sindy, network, tmp_path
-):
+def test_a_file_holds_plain_json_and_what_it_cannot_hold_leaves_the_old(sindy, network, tmp_path):
     for fitted in (sindy, network):
         content = json.loads(gzip.decompress(fitted.save(tmp_path / "law.discover").read_bytes()))
         assert content["version"] == 3

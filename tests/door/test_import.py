@@ -126,9 +126,7 @@ with jax.enable_x64(False) if hasattr(jax, "enable_x64") else jax.experimental.d
 """
 
 
-def test_arrays_of_single_precision_are_an_error_and_without_them_a_first_call_writes_nothing(
-    tmp_path,
-):
+def test_single_precision_is_an_error_and_else_a_first_call_writes_nothing(tmp_path):
     said, error = python(FIRST_CALL, str(tmp_path))
     first, taken, level, second = said.strip().splitlines()
     assert "1 array of single precision" in first

@@ -79,9 +79,7 @@ def test_the_python_function_simulates_as_the_package_does_and_json_gives_the_la
         ),
     ],
 )  # fmt: skip
-def test_exported_python_starts_from_rest_at_zero_and_sees_the_rate_between_samples(
-    rate, flow, times
-):
+def test_exported_python_starts_at_rest_and_sees_the_rate_between_samples(rate, flow, times):
     law = equations.Equation((LawTerm("sigma.sigma", 0.35),), (50.0,), (0.8,))
     module = module_of(equations.write_equation(law, "python"))
     wanted = Giesekus(0.35, 50.0, 0.8).respond(flow, times)

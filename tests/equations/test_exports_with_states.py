@@ -297,9 +297,7 @@ def test_a_law_that_loses_its_conformation_and_one_that_runs_away_say_so():
     ],
     ids=["coefficient", "modes", "rate"],
 )
-def test_a_check_that_would_not_end_is_given_up_and_the_export_says_so(
-    terms, modulus, times, wi, monkeypatch
-):
+def test_a_check_that_would_not_end_is_given_up_and_said(terms, modulus, times, wi, monkeypatch):
     # the same limit as in use, reached sooner
     monkeypatch.setattr("discover.equations.formats.in_a_solver._MOST_EVALUATIONS", 3000)
     tested = Where(Box((0.5, wi), (20.0, 20.0)))

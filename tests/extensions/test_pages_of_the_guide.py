@@ -8,10 +8,9 @@ import shlex
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 from user_packages import LEARNER_CODE, Workplace, blocks, install, project
 
-from discover.cli import app
 from discover.dataset import load_dataset
 from discover.laws.registry import _named_laws
 
@@ -233,9 +232,7 @@ def test_without_the_package_the_study_of_the_page_is_refused(workplace, page, s
     # negative control of the tests above, in this process, where nothing is installed
     study, out = workplace.folder / workplace.study(page), workplace.folder / "out"
     command = "close-loop" if page in (LAW, EFFECT) else "compare"
-    done = CliRunner().invoke(app, [command, str(study), "--out", str(out)])
-    assert done.exit_code == 2
-    assert said in done.stderr
+    assert said in invoke(command, study, "--out", out, code=2).stderr
 
 
 @pytest.mark.slow
@@ -294,9 +291,7 @@ def test_a_sound_package_is_loaded_once_where_laws_are_asked_for_without_a_warni
     assert workplace.run("effects").stderr == ""
 
 
-def test_of_two_packages_with_one_name_the_second_is_left_out_and_one_imported_before_is_known_once(
-    workplace,
-):
+def test_of_two_packages_with_one_name_one_is_left_out_and_none_known_twice(workplace):
     for name in ("one", "two"):
         code = OWN_LAW.format(name="ours")
         install(workplace.packages, name, code, project("laws", name, ours=name))

@@ -6,13 +6,12 @@ import runpy
 import numpy as np
 import pandas as pd
 import pytest
+from command_line import invoke
 from independent import Giesekus, start_up
 from independent.folders import maxwell_sweep
 from independent.noise import white
-from typer.testing import CliRunner
 
 import discover as dc
-from discover.cli.app import app
 
 MODULUS, TIME, MOBILITY = 80.0, 1.7, 0.3
 NOISE = 0.01
@@ -71,9 +70,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert sum(held) >= 26
 
 
-def test_a_prediction_is_one_row_after_the_other_and_correlations_are_those_of_the_covariance(
-    data, fitted
-):
+def test_predictions_follow_their_rows_and_correlations_the_covariance(data, fitted):
     times = np.linspace(0.05, 8.0, 80)
     exact = [giesekus_start_up(rate, times) for rate in (0.5, 1.5, 3.0, 6.0)]
     # constants from 240 samples of 1 % noise: predictions are off by less than 1 %
@@ -166,9 +163,7 @@ def test_the_command_writes_page_json_and_equation(data, tmp_path):
         pd.DataFrame(table).to_csv(folder / f"{run.name}.csv", index=False)
     (folder / "runs.csv").write_text("file\n" + "".join(f"{r.name}.csv\n" for r in data.runs))
     out = tmp_path / "out"
-    command = ["fit", "giesekus", str(folder), "--held-out", "6.csv", "--out", str(out)]
-    result = CliRunner().invoke(app, command)
-    assert result.exit_code == 0, result.output
+    invoke("fit", "giesekus", folder, "--held-out", "6.csv", "--out", out, code=0)
     written = json.loads((out / "fit.json").read_text())
     keys = {"law", "constants", "modes", "solvent_viscosity_Pa_s", "range", "expected_error"}
     assert keys <= set(written["use"])
@@ -176,8 +171,7 @@ def test_the_command_writes_page_json_and_equation(data, tmp_path):
     assert "Fits within the noise of" in (out / "report.html").read_text()
     assert (out / "equations.tex").exists()
     assert (out / "figures" / "runs.svg").exists()
-    exported = CliRunner().invoke(app, ["export", str(out), "--out", str(tmp_path / "law.py")])
-    assert exported.exit_code == 0, exported.output
+    invoke("export", out, "--out", tmp_path / "law.py", code=0)
     assert "Fits within the noise of" in (tmp_path / "law.py").read_text("utf-8")
     law = runpy.run_path(str(tmp_path / "law.py"))
     times = np.geomspace(0.1, 6.0, 9)

@@ -62,13 +62,3 @@ def test_a_rate_that_steps_between_samples_still_steps_there():
         np.array([0.0, 0.0, 0.3, 0.7]), make_batch([run, *others])
     )
     np.testing.assert_allclose(both[:1], expected, rtol=1e-10)
-
-
-def test_runs_of_different_length_do_not_touch_each_other():
-    model = AugmentedModel(DECLARED, [*map(make_effect, AMPLITUDES)])
-    # the rate is steady: no inertia, unless it were seen to stop where the padding starts
-    theta = vector_of(model, giesekus_mobility=0.2, instrument_inertia=10.0)
-    short = record("short", start_up(1.0), 1.0, 2)
-    alone = model.predict(theta, make_batch([short]))[0]
-    together = model.predict(theta, make_batch([short, *MANY]))[0][:2]
-    np.testing.assert_allclose(together, alone, rtol=1e-9)

@@ -52,8 +52,8 @@ def integrate(slope, size, rate):
     return solution.y
 
 
-# an error of the normal force leaves a shear stress as it is (tests/inference/test_transducers.py),
-# and plates leave that of a Maxwell fluid (tests/effects/test_parallel_plates.py)
+# an error of the normal force leaves a shear stress as it is, and plates that of a Maxwell fluid:
+# tests/inference/test_transducers.py
 OF_SHEAR = sorted(
     name
     for name, one in named_effects().items()

@@ -1,15 +1,18 @@
-"""What an experiment can determine, before any fit."""
+"""What an experiment can determine before any fit, and what is physically sound."""
 
 import json
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.identify.physics import check_physics, see
 from discover.identify.structure import analyse_structure
-from discover.protocols import oscillatory_shear
+from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
+from discover.protocols import imposed_stress, in_flow, oscillatory_shear, start_up
 from discover.simulate import synthetic_dataset
-from tensor_library import LawTerms, build_library, parse_term
+from tensor_library import LawTerms, TermLibrary, build_library, parse_term
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 FLOWS = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}
@@ -87,3 +90,110 @@ def test_measured_normal_stresses_are_not_called_undetermined(runs):
     with_both = [replace(run, **both) for run in runs]
     structure = analyse_structure(with_both, LIBRARY, nominal={}, use_normal_stresses=True)
     assert [q.verdict for q in structure.laws[0].quantities] == ["measured", "measured"]
+
+
+WAVES = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}
+FLOW_CURVE = "flow curve monotonic"
+EXTENSION = "steady extension bounded"
+TERMS = ("sigma", "gammadot", "sigma.sigma", "tr(sigma)*sigma")
+
+
+def expansion(**coefficients):
+    """One structure for every library law here, so that they share programs."""
+    library = TermLibrary(tuple(parse_term(name) for name in TERMS))
+    values = [coefficients.get(key, 0.0) for key in ("linear", "viscous", "quadratic", "trace")]
+    return LibraryExpansion(jnp.array(values), jnp.zeros(0), library)
+
+
+def report(law, solvent=0.0):
+    flows = list(WAVES.values())
+    fluid = Fluid(law, 1.0, 1.0, solvent)
+    seen = see(fluid, flows, [np.linspace(0, 10, 81)] * 2, 2.0, 1.0)
+    return check_physics(seen, dict(enumerate(WAVES)))
+
+
+@pytest.fixture(scope="module")
+def maxwell():
+    return report(UpperConvectedMaxwell())
+
+
+@pytest.fixture(scope="module")
+def slipping():
+    return report(JohnsonSegalman(0.4))
+
+
+@pytest.mark.slow
+def test_maxwell_is_sound_except_in_extension_beyond_half_in_plain_json(maxwell):
+    failed = {c.name for c in maxwell.checks if not c.passed}
+    assert failed == {EXTENSION}
+    # σ11 = 2ε̇/(1 − 2ε̇); the last step is resolved to 1/60 of a grid step of 3 %
+    assert maxwell[EXTENSION].value == pytest.approx(0.5, rel=1e-3)
+    content = json.loads(json.dumps(maxwell.to_json(), allow_nan=False))
+    assert {c["name"] for c in content["checks"]} >= {FLOW_CURVE, EXTENSION}
+    assert EXTENSION in content["text"]
+
+
+@pytest.mark.slow
+def test_slip_without_solvent_bands_and_stretches_without_bound_beyond_its_own_rates(slipping):
+    # σ12 = γ̇/(1 + ξ(2 − ξ)γ̇²), largest at 1/√0.64 = 1.25; the grid is 4 % fine
+    assert slipping[FLOW_CURVE].passed is False
+    assert slipping[FLOW_CURVE].value == pytest.approx(1.25, rel=0.04)
+    assert "within the rates of training" in slipping[FLOW_CURVE].text
+    # 2(1 − ξ)ε̇ = 1
+    assert slipping[EXTENSION].value == pytest.approx(1 / 1.2, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_enough_solvent_makes_slip_monotonic_and_linear_terms_and_feedback_are_caught():
+    # dσ/dγ̇ is least at −1/8 of the polymer's viscosity
+    assert report(JohnsonSegalman(0.4), solvent=0.126)[FLOW_CURVE].passed
+    assert report(JohnsonSegalman(0.4), solvent=0.120)[FLOW_CURVE].passed is False
+    assert report(expansion(quadratic=0.2))["small-strain limit"].passed
+    changed = report(expansion(linear=0.1))["small-strain limit"]
+    # 1/(iω + 1.1) against 1/(iω + 1): 0.1/1.1 at vanishing frequency
+    assert changed.passed is False
+    assert changed.value == pytest.approx(0.1 / 1.1, rel=1e-3)
+    # h = −1.5 σ: stress grows by itself
+    checks = report(expansion(linear=-1.5))
+    # where the conformation tensor loses definiteness the stored energy is not defined
+    names = ("dissipation non-negative", "conformation tensor positive definite")
+    assert False in [checks[name].passed for name in names]
+    assert checks[EXTENSION].passed is False
+
+
+@pytest.mark.parametrize(("mobility", "monotonic"), [(0.2, True), (0.45, True), (0.6, False)])
+def test_giesekus_is_monotonic_up_to_a_mobility_of_one_half(mobility, monotonic):
+    checks = report(Giesekus(mobility))
+    assert checks[FLOW_CURVE].passed is monotonic
+    assert checks[EXTENSION].passed
+
+
+def test_in_extension_the_dissipation_is_that_of_extension():
+    times = np.array([40.0, 50.0])
+    seen = see(Fluid(), [in_flow(start_up(0.2), "uniaxial")], [times], 2.0, 1.0)
+    # A = diag(1/(1 − 2ε̇), 1/(1 + ε̇), 1/(1 + ε̇)), and tr(A + A⁻¹ − 2I)/2 is lost; what is left of
+    # the start is exp(−24), and steps err by 1e-6
+    lost = 0.5 * sum(a + 1.0 / a - 2.0 for a in (1.0 / 0.6, 1.0 / 1.2, 1.0 / 1.2))
+    assert seen.along.dissipation[0] == pytest.approx(lost, rel=1e-5)
+
+
+def test_where_no_rate_is_given_conformations_are_those_of_oscillations_like_in_training():
+    times = np.linspace(0.5, 10.0, 20)
+    creep, start = imposed_stress(times, np.ones(20)), start_up(1.0)
+    seen = see(Fluid(solvent_viscosity=0.1), [creep, start], [times, times], 2.0, 1.0)
+    told = [check_physics(seen, names).checks[0] for names in ({0: "creep"}, {0: "creep", 1: "b"})]
+    assert [one.passed for one in told] == [True, True]
+    assert told[0].where.startswith("oscillation at Wi = 2, ")
+    assert told[1].where == "b"
+
+
+def test_negative_viscosity_does_negative_work_and_a_law_that_runs_away_ends_its_box():
+    # h = 2 γ̇: the elastic response has the wrong sign
+    checks = report(expansion(viscous=2.0))
+    assert checks["work over a cycle non-negative"].passed is False
+    # −0.1 tr(σ)σ thins the relaxation until it turns into growth
+    checks = report(expansion(trace=-0.1))
+    reach = checks["integrates beyond training"]
+    assert reach.passed is False
+    assert 0.0 <= reach.value < 10.0
+    assert "diverges" in reach.text

@@ -46,37 +46,36 @@ def claim(case, verdict, stages=(), off=0.0, **more):
     return judge(case, "close-loop", said, rows, clean, noisy)["false"]
 
 
-@pytest.mark.parametrize("verdict", ["effects_added", "no_effect_needed"])
-def test_to_explain_nothing_is_false(verdict):
-    assert claim(EMPTY, verdict)
+def mobility(value):
+    return stage("giesekus_mobility", alpha=(value, (value - 0.02, value + 0.02)))
+
+
+EXPLAINED, ADDED = "no_effect_needed", "effects_added"
+CLAIMS = {
+    "of a dead sensor effects": (EMPTY, ADDED, [], 0.0, True),
+    "of a dead sensor none": (EMPTY, EXPLAINED, [], 0.0, True),
+    "what is missed": (OUTSIDE, EXPLAINED, [], 0.8, True),
+    "what is met": (OUTSIDE, EXPLAINED, [], 0.2, False),
+    "what is planted": (PLANTED, ADDED, [mobility(0.31)], 0.0, False),
+    "its alias": (PLANTED, ADDED, [stage("ptt_linear", ["giesekus_mobility"])], 0.0, False),
+    "no alias": (PLANTED, ADDED, [stage("ptt_linear", ["wall_slip"])], 0.0, True),
+    "a name where none is": (KNOWN, ADDED, [stage("ptt_linear")], 0.0, True),
+    "nothing where one is": (PLANTED, EXPLAINED, [], 2.0, True),
+    # 0.3 planted: an interval may miss by three half-widths and no more
+    "near": (PLANTED, ADDED, [mobility(0.34)], 0.0, False),
+    "far": (PLANTED, ADDED, [mobility(0.40)], 0.0, True),
+}
+
+
+@pytest.mark.parametrize(("case", "verdict", "stages", "off", "false"), CLAIMS.values(), ids=CLAIMS)
+def test_to_explain_is_false_where_it_is_not_so(case, verdict, stages, off, false):
+    assert bool(claim(case, verdict, stages, off)) is false
 
 
 @pytest.mark.parametrize("verdict", ["unexplained", "no_signal"])
 def test_to_claim_nothing_is_never_false(verdict):
     for case in (EMPTY, OUTSIDE, PLANTED, KNOWN):
         assert not claim(case, verdict, [stage("wall_slip")], off=3.0)
-
-
-def test_to_explain_what_is_missed_is_false_and_what_is_met_is_not():
-    assert claim(OUTSIDE, "no_effect_needed", off=0.8)
-    assert not claim(OUTSIDE, "no_effect_needed", off=0.2)
-
-
-def test_a_name_must_be_planted_or_an_alias_of_what_is():
-    right = {"alpha": (0.31, (0.29, 0.33))}
-    assert not claim(PLANTED, "effects_added", [stage("giesekus_mobility", **right)])
-    alias = stage("ptt_linear", ["giesekus_mobility"])
-    assert not claim(PLANTED, "effects_added", [alias])
-    assert claim(PLANTED, "effects_added", [stage("ptt_linear", ["wall_slip"])])
-    assert claim(KNOWN, "effects_added", [stage("ptt_linear")])
-    assert claim(PLANTED, "no_effect_needed", off=2.0)
-
-
-def test_an_interval_may_miss_by_three_half_widths_and_no_more():
-    near = {"alpha": (0.34, (0.32, 0.36))}
-    far = {"alpha": (0.40, (0.38, 0.42))}
-    assert not claim(PLANTED, "effects_added", [stage("giesekus_mobility", **near)])
-    assert claim(PLANTED, "effects_added", [stage("giesekus_mobility", **far)])
 
 
 @pytest.mark.parametrize(
@@ -89,9 +88,7 @@ def test_an_interval_may_miss_by_three_half_widths_and_no_more():
         ({}, 0.1, 0.15, False),
     ],
 )
-def test_a_normal_stress_that_is_determined_holds_within_two_bands(
-    statement, half_band, off, false
-):
+def test_a_determined_normal_stress_holds_within_two_bands(statement, half_band, off, false):
     clean, noisy = made(KNOWN)
     rows = {}
     for name, run in clean.items():
@@ -140,9 +137,7 @@ def test_every_line_of_the_file_is_a_case_with_records_that_reproduce():
     ],
     ids=["few candidates", "close-loop", "compare"],
 )
-def test_a_dead_sensor_goes_through_the_whole_program_without_a_claim(
-    question, loop, tmp_path, monkeypatch
-):
+def test_a_dead_sensor_leads_the_whole_program_to_no_claim(question, loop, tmp_path, monkeypatch):
     monkeypatch.setattr(hostile, "case_named", lambda name: replace(EMPTY, loop=loop))
     row = ask("hostile", "dead_sensor", question, 0, str(tmp_path), 600.0)
     assert row["verdict"] not in (*product.CONFIDENT, "fault", "late"), row.get("message")

@@ -55,9 +55,7 @@ TWO = [["ptt_linear", "tr(sigma)*sigma"], ["stress_gain"]]
         ([[]], None, False),
     ],
 )
-def test_an_answer_is_right_if_one_of_its_twins_names_all_that_is_there_and_no_more(
-    members, effects, right
-):
+def test_an_answer_is_right_if_a_twin_names_all_there_is_and_no_more(members, effects, right):
     assert is_right(members, effects) == right
 
 

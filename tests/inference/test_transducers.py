@@ -1,22 +1,30 @@
-"""What transducers do to records, on fluids that scipy simulated: each has a gain, and may be read
-more often than it has values."""
+"""What transducers and plates do to records, on fluids that scipy simulated.
+
+Each transducer has a gain, and may be read more often than it has values. Between plates the
+apparent stress of an export is 2M/(πR³) = 4 ∫ x² σ(x γ̇) dx [Bird, Armstrong & Hassager 1987,
+eq. 10.2-15]: that of a Newtonian fluid of the same torque, summed here over twelve radii.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus
-from independent.flow import oscillation, start_up
+from independent import Giesekus, PhanThienTanner
+from independent.flow import Flow, oscillation, start_up
 from independent.folders import write_folder
 from independent.instruments import Instrument
+from independent.noise import white
+from vectors import vector_of
 
 import discover as dc
-from discover.forward import DeclaredModel
+from discover.effects import make_effect
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.inference.engine import Problem, explain
 from discover.loop.runs import split_runs
 from discover.loop.task import candidates_of
 
 MODULUS, TIME, MOBILITY, NOISE, SAMPLES = 180.0, 0.7, 0.25, 0.01, 120
+GIESEKUS = Giesekus(MOBILITY, MODULUS, TIME)
 FLOWS = {
     "a.csv": (start_up(1.2), 5.0),
     "b.csv": (start_up(3.5), 4.0),
@@ -27,29 +35,34 @@ CANDIDATES = ["giesekus_mobility", "stress_gain", "rate_gain", "normal_force_gai
               "transducer_lag", "time_delay", "stress_offset"]  # fmt: skip
 
 
-def noisy(values, lot):
-    return values + NOISE * np.sqrt(np.mean(values**2)) * lot.standard_normal(len(values))
+def explained_of(folder, record, candidates, with_force=False):
+    """Return the problem of what is recorded of each flow at some times, and its posterior.
 
-
-def explained(folder, instrument, force=1.0, hold=1, with_force=False):
-    """Return the problem of a Giesekus fluid's records, and its posterior.
-
-    `force`: by what N1 is multiplied. `hold`: samples in which each value stands. `with_force`:
-    whether N1 is fitted beside the shear stress.
+    `with_force`: whether N1 is fitted beside the shear stress.
     """
-    lot, held, runs = np.random.default_rng(0), np.arange(SAMPLES) // hold * hold, {}
-    for name, (flow, end) in FLOWS.items():
-        times = np.linspace(0.03, end, SAMPLES)
-        run = instrument.record(Giesekus(MOBILITY, MODULUS, TIME), flow, times)
-        stress, normal = noisy(run.stress, lot)[held], force * noisy(run.N1, lot)[held]
-        runs[name] = replace(run, stress=stress, N1=normal, N2=None)
+    runs = {n: record(flow, np.linspace(0.03, end, SAMPLES)) for n, (flow, end) in FLOWS.items()}
     data = dc.load_dataset(write_folder(folder / "data", runs, normal_stresses=with_force))
     if with_force:
         also = tuple(run.observing("N1") for run in data.runs)
         data = replace(data, runs=(*data.runs, *also))
     fitted, _, _ = split_runs(data, None, [], None, 400)
-    problem = Problem(DeclaredModel.maxwell([MODULUS], [TIME]), candidates_of(CANDIDATES), fitted)
+    problem = Problem(DeclaredModel.maxwell([MODULUS], [TIME]), candidates_of(candidates), fitted)
     return problem, explain(problem)
+
+
+def explained(folder, instrument, force=1.0, hold=1, with_force=False):
+    """Return the problem of a Giesekus fluid's records, and its posterior.
+
+    `force`: by what N1 is multiplied. `hold`: samples in which each value stands.
+    """
+    lot, held = np.random.default_rng(0), np.arange(SAMPLES) // hold * hold
+
+    def record(flow, times):
+        run = instrument.record(GIESEKUS, flow, times)
+        stress, normal = (white(one, NOISE, lot)[held] for one in (run.stress, run.N1))
+        return replace(run, stress=stress, N1=force * normal, N2=None)
+
+    return explained_of(folder, record, CANDIDATES, with_force)
 
 
 def names_of(posterior):
@@ -87,3 +100,65 @@ def test_a_sound_normal_force_is_not_named_and_a_torque_that_reads_wrong_is(tmp_
         "giesekus_mobility", *(["stress_gain"] if of_torque else []),
     )  # fmt: skip
     assert not of_torque or holds(problem, posterior, "stress_gain", of_torque)
+
+
+FLUIDS = {
+    "giesekus_mobility": (GIESEKUS, MOBILITY),
+    "ptt_linear": (PhanThienTanner(0.15, modulus=MODULUS, relaxation_time=TIME), 0.15),
+}
+BESIDE_PLATES = [
+    "giesekus_mobility", "ptt_linear", "ptt_exponential", "non_affine_motion", "parallel_plates",
+    "stress_gain", "rate_gain", "transducer_lag", "time_delay", "wall_slip", "thixotropy",
+]  # fmt: skip
+
+
+def of_plates(fluid, flow, times):
+    """Return what an instrument with plates calls the stress, without noise."""
+    radii, weights = np.polynomial.legendre.leggauss(12)
+    total = 0.0
+    for x, weight in zip((radii + 1) / 2, weights / 2, strict=True):
+        inner = Flow(lambda t, x=x: x * flow.rate(t), lambda t, x=x: x * flow.strain(t), flow.jumps)
+        total = total + 4 * weight * x**2 * Instrument().record(fluid, inner, times).stress
+    return total
+
+
+@pytest.mark.parametrize(
+    ("flow", "protocol"),
+    [(start_up(4.0), dc.start_up(4.0)), (oscillation(3.0, 1.2), dc.oscillatory_shear(3.0, 1.2))],
+)
+def test_torque_is_that_of_twelve_radii(flow, protocol):
+    times = np.linspace(0.05, 6.0, 60)
+    expected = of_plates(GIESEKUS, flow, times)
+    rate = np.array([flow.rate(t) for t in times])
+    run = dc.Run("plates", times, protocol, rate, expected)
+    effects = [make_effect(n) for n in ("giesekus_mobility", "parallel_plates", "stress_offset")]
+    model = AugmentedModel(DeclaredModel.maxwell([MODULUS], [TIME]), effects)
+    theta = vector_of(model, giesekus_mobility=MOBILITY, parallel_plates=1.0)
+    batch = make_batch([run])
+    found = model.predict(theta, batch)[0, : len(times)]
+    # Radau's rule with four nodes, of a stress over the rate that falls to a third
+    assert np.max(np.abs(found - expected)) < 2e-3 * np.max(np.abs(expected))
+    theta[model.positions("stress_offset")[0]] = 5.0
+    # a zero of the transducer is one of the torque, whatever the radii
+    assert model.predict(theta, batch)[0, : len(times)] == pytest.approx(found + 5.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("plates", [True, False])
+@pytest.mark.parametrize("name", FLUIDS)
+def test_plates_without_correction_are_told_and_not_of_a_cone(tmp_path, name, plates):
+    (fluid, value), lot = FLUIDS[name], np.random.default_rng(5)
+
+    def record(flow, times):
+        run = Instrument().record(fluid, flow, times)
+        stress = of_plates(fluid, flow, times) if plates else run.stress
+        return replace(run, stress=white(stress, NOISE, lot), N1=None, N2=None)
+
+    problem, posterior = explained_of(tmp_path, record, BESIDE_PLATES)
+    if not plates:
+        assert posterior.explanations[0].members[0] == (name,)
+        return
+    assert posterior.verdict != "unexplained"
+    assert {name, "parallel_plates"} in map(set, posterior.explanations[0].members)
+    assert posterior.explanations[0].probability > 0.5
+    assert holds(problem, posterior, name, value)
+    assert holds(problem, posterior, "parallel_plates", 1.0)

@@ -9,9 +9,9 @@ from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian, weights_of
 
 
-def nearly_giesekus(mobility):
+def nearly_giesekus(mobility, width=3):
     """Return a network's law whose coefficients are nearly those of a Giesekus fluid."""
-    law = initial_law(jax.random.key(0), 3, True, jnp.ones(8))
+    law = initial_law(jax.random.key(0), width, True, jnp.ones(8))
     last = 0.01 * jax.random.normal(jax.random.key(1), law.network.layers[-1].weight.shape)
     return eqx.tree_at(
         lambda tree: (tree.network.layers[-1].weight, tree.constants),

@@ -29,11 +29,8 @@ def small_dataset(law, parameters=None, noise=0.0, seed=0, n_samples=65):
 
 def with_normal_stresses(dataset):
     """Return the runs with their exact normal stress differences as if measured."""
+    names = "first_normal_stress_difference", "second_normal_stress_difference"
     return [
-        replace(
-            run,
-            first_normal_stress_difference=dataset.exact[run.name].first_normal_stress_difference,
-            second_normal_stress_difference=dataset.exact[run.name].second_normal_stress_difference,
-        )
+        replace(run, **{name: getattr(dataset.exact[run.name], name) for name in names})
         for run in dataset
     ]

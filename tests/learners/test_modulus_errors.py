@@ -4,7 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from independent import Giesekus, start_up
+from independent import multimode_giesekus, start_up
+from independent.noise import white
+from noisy_runs import run_at
 
 import discover as dc
 from discover.comparison import learning
@@ -22,23 +24,18 @@ MOBILITY_TERM = TermLibrary((parse_term("sigma.sigma"),))
 
 
 @cache
-def stress(rate, quantity="sigma12"):
+def stress(rate):
     """Of three Giesekus modes in start-up: times in s, stress in Pa."""
     times = np.linspace(0.05, 12.0 / rate + 2.0, 60)
-    parts = (
-        modulus * getattr(Giesekus(MOBILITY).respond(start_up(rate * time), times / time), quantity)
-        for modulus, time in zip(MODULUS, TIME, strict=True)
-    )
-    return times, sum(parts)
+    fluid = multimode_giesekus([MOBILITY] * 3, MODULUS, TIME)
+    return times, fluid.respond(start_up(rate), times).sigma12
 
 
-def records(seed, rates=RATES):
+def records(seed):
     generator, runs = np.random.default_rng(1000 + seed), []
-    for rate in rates:
+    for rate in RATES:
         times, exact = stress(rate)
-        off = NOISE * np.sqrt(np.mean(exact**2)) * generator.standard_normal(times.size)
-        name = f"at_{rate:g}"
-        runs.append(dc.Run(name, times, dc.start_up(rate), np.full(times.size, rate), exact + off))
+        runs.append(run_at(rate, times, white(exact, NOISE, generator), f"at_{rate:g}"))
     return runs
 
 

@@ -21,13 +21,21 @@ def found(model):
     return {term.term: term.coefficient for term in model.terms_}
 
 
+def simulated(fluid, runs):
+    """Return the runs with what a fluid would record."""
+    return [
+        replace(run, stress=simulate(fluid, run.protocol, run.time).shear_stress) for run in runs
+    ]
+
+
 @pytest.fixture(scope="module")
 def giesekus():
     # as many terms as other tests here ask for, so that they share programs
     return TensorSINDy(LIBRARY, max_terms=2).fit(small_dataset("giesekus", {"alpha": 0.2}))
 
 
-def test_giesekus_comes_back_alone(giesekus):
+def test_giesekus_comes_back_alone_and_without_twins_in_the_library(giesekus):
+    assert not any(r["exact"] for r in giesekus.result_.details["rivals"])
     assert set(found(giesekus)) == {"sigma.sigma"}
     # the fixed-step integration is good to 1e-6 of the stress
     assert found(giesekus)["sigma.sigma"] == pytest.approx(0.2, abs=1e-5)
@@ -83,10 +91,6 @@ def test_twins_in_shear_stress_are_listed_and_the_simplest_is_chosen():
     assert not any(r["exact"] for r in informed.result_.details["rivals"])
 
 
-def test_a_law_without_twins_in_the_library_lists_none(giesekus):
-    assert not any(r["exact"] for r in giesekus.result_.details["rivals"])
-
-
 @pytest.mark.slow
 def test_exponential_ptt_comes_back_with_its_inner_parameter():
     data = small_dataset("ptt_exponential", {"epsilon": 0.4})
@@ -112,11 +116,7 @@ def test_a_coefficient_that_is_not_one_is_not_taken_for_it():
     law = LibraryExpansion(
         jnp.array([0.5]), jnp.array([0.7]), LIBRARY.subset([LIBRARY.names.index(EXPONENTIAL)])
     )
-    fluid = Fluid.dimensionless(law)
-    runs = [
-        replace(run, stress=simulate(fluid, run.protocol, run.time).shear_stress)
-        for run in small_dataset("ptt_exponential", {"epsilon": 0.4})
-    ]
+    runs = simulated(Fluid.dimensionless(law), small_dataset("ptt_exponential", {"epsilon": 0.4}))
     (term,) = TensorSINDy(LIBRARY, **OF_TWO).fit(runs).terms_
     assert term.coefficient == pytest.approx(0.5, abs=1e-3)
     assert term.inner["epsilon"] == pytest.approx(0.7, abs=1e-3)
@@ -127,13 +127,7 @@ def test_a_redundant_first_pick_leaves():
     # Of single terms tr(σ)σ imitates this law best, but it is no part of it
     index = [LIBRARY.names.index(name) for name in ("sigma", "tr(sigma)^2*sigma")]
     law = LibraryExpansion(jnp.array([0.2, 0.15]), jnp.zeros(0), LIBRARY.subset(index))
-    runs = [
-        replace(
-            run,
-            stress=simulate(Fluid.dimensionless(law), run.protocol, run.time).shear_stress,
-        )
-        for run in small_dataset("ucm")
-    ]
+    runs = simulated(Fluid.dimensionless(law), small_dataset("ucm"))
     polynomials = TensorSINDy(LIBRARY, **OF_TWO).fit(runs)
     assert polynomials.search_.path()[1].names != ("sigma",)
     assert set(found(polynomials)) == {"sigma", "tr(sigma)^2*sigma"}
@@ -144,10 +138,7 @@ def test_a_redundant_first_pick_leaves():
 def test_modes_share_one_law_of_which_not_even_the_relaxation_is_known():
     modulus, relaxation_time = [30.0, 10.0], [0.5, 3.0]
     truth = Fluid(Giesekus(0.3), modulus, relaxation_time)
-    runs = [
-        replace(run, stress=simulate(truth, run.protocol, run.time).shear_stress)
-        for run in small_dataset("ucm")
-    ]
+    runs = simulated(truth, small_dataset("ucm"))
     known = Fluid(UpperConvectedMaxwell(False), modulus, relaxation_time)
     model = TensorSINDy(LIBRARY, base=known).fit(runs)
     assert set(found(model)) == {"sigma", "sigma.sigma"}
@@ -196,16 +187,12 @@ def test_a_grid_search_of_scikit_learn_takes_the_library_that_has_the_term():
 
 @pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize(
-    ("parameters", "message"),
-    [({"library": ["sigma"]}, "TermLibrary"), ({"max_terms": 0}, "max_terms")],
-)
-def test_bad_parameters_give_one_clear_error(parameters, message):
+    ("parameters", "runs", "message"),
+    [
+        ({"library": ["sigma"]}, None, "TermLibrary"), ({"max_terms": 0}, None, "max_terms"),
+        ({}, [], "at least one run"), ({}, [1.0, 2.0], "Run"),
+    ],
+)  # fmt: skip
+def test_bad_parameters_and_runs_give_one_clear_error(parameters, runs, message):
     with pytest.raises(InputError, match=message):
-        TensorSINDy(**parameters).fit(small_dataset("ucm"))
-
-
-@pytest.mark.usefixtures("as_users_run_it")
-@pytest.mark.parametrize(("runs", "message"), [([], "at least one run"), ([1.0, 2.0], "Run")])
-def test_bad_runs_give_one_clear_error(runs, message):
-    with pytest.raises(InputError, match=message):
-        TensorSINDy().fit(runs)
+        TensorSINDy(**parameters).fit(small_dataset("ucm") if runs is None else runs)

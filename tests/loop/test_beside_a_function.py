@@ -1,13 +1,13 @@
 """Answers behind what has no name: a transducer that bends, and a kernel with another N2."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
-import pandas as pd
 import pytest
-from independent.chains import KBKZ
-from independent.flow import start_up as flow_at
-from independent.noise import white
-from scipy.integrate import solve_ivp
+from independent import KBKZ, PhanThienTanner, multimode_giesekus
+from independent.noise import proportional, white
+from noisy_runs import start_ups
 
 import discover as dc
 from discover.effects import EffectParameter, SignalEffect, named_effects
@@ -16,41 +16,19 @@ from discover.report.first_screen import answer_screen
 
 MODULUS, TIME, EPSILON = 60.0, 1.3, 0.25
 RATES = {"a": 0.7, "b": 1.5, "c": 3.0, "d": 4.5}
+FLUID = PhanThienTanner(EPSILON, modulus=MODULUS, relaxation_time=TIME)
 CANDIDATES = ["ptt_linear", "giesekus_mobility", "stress_gain", "stress_offset"]
-
-
-def start_up(rate, times):
-    """Return the shear stress of linear PTT   [Phan-Thien & Tanner 1977, JNNFM 2, 353]."""
-
-    def change(_, stress):
-        normal, shear = stress
-        faster = (1.0 + EPSILON * normal / MODULUS) / TIME
-        return [2.0 * rate * shear - faster * normal, MODULUS * rate - faster * shear]
-
-    found = solve_ivp(change, (0.0, times[-1]), [0.0, 0.0], t_eval=times, rtol=1e-9, atol=1e-9)
-    return found.y[1]
-
-
-def data_of(stresses, times):
-    tables = [
-        pd.DataFrame({"time_s": times, "shear_rate_1_s": rate, "stress_Pa": stress}).assign(
-            run=name
-        )
-        for (name, rate), stress in stresses
-    ]
-    return dc.from_dataframe(pd.concat(tables))
 
 
 def runs_of(limit=np.inf):
     """Return runs of a transducer with a limit, over the largest stress fitted."""
     times, lot = np.linspace(0.05, 6.0, 80), np.random.default_rng(7)
-    stress = {name: start_up(rate, times) for name, rate in RATES.items()}
-    largest = limit * np.max(stress["c"])
-    shown = [
-        np.clip(values, -largest, largest) * (1.0 + 0.01 * lot.standard_normal(len(times)))
-        for values in stress.values()
-    ]
-    return data_of(zip(RATES.items(), shown, strict=True), times)
+    exact = start_ups(FLUID, RATES.values(), times, 0.0, names=[*RATES])
+    largest = limit * np.max(exact["c"].stress)
+    return dc.Dataset("clipped", tuple(
+        replace(run, stress=proportional(np.clip(run.stress, -largest, largest), 0.01, lot))
+        for run in exact
+    ))  # fmt: skip
 
 
 def loop_of(limit=np.inf):
@@ -131,44 +109,28 @@ SATURATION = Saturation(
 )  # fmt: skip
 
 
-def giesekus(rate, times, modulus, time, mobility):
-    """Return the shear stress of a mode   [Giesekus 1982, JNNFM 11, 69]."""
-
-    def change(_, stress):
-        s11, s12, s22 = stress
-        strain = mobility / (modulus * time)
-        return [
-            2.0 * rate * s12 - s11 / time - strain * (s11**2 + s12**2),
-            rate * (modulus + s22) - s12 / time - strain * s12 * (s11 + s22),
-            -s22 / time - strain * (s12**2 + s22**2),
-        ]
-
-    found = solve_ivp(change, (0.0, times[-1]), np.zeros(3), "LSODA", times, rtol=1e-9, atol=1e-7)
-    return found.y[1]
-
-
 @pytest.mark.slow
 def test_a_saturation_that_a_user_names_is_found_where_other_effects_seem_nearer_at_first():
-    moduli, times = np.array([1000.0, 300.0]), np.array([1.0, 0.1])
-    sampled, lot, records = np.linspace(0.1, 6.0, 60), np.random.default_rng(0), []
-    for rate in (0.5, 1.0, 2.0, 4.0, 8.0):
-        true = sum(giesekus(rate, sampled, *mode, 0.25) for mode in zip(moduli, times, strict=True))
-        records.append(((f"r{rate:g}", rate), white(true / (1.0 + 3e-4 * true), 0.01, lot)))
+    moduli, times, lot = (1000.0, 300.0), (1.0, 0.1), np.random.default_rng(0)
+    rates = (0.5, 1.0, 2.0, 4.0, 8.0)
+    exact = start_ups(
+        multimode_giesekus([0.25] * 2, moduli, times), rates, np.linspace(0.1, 6.0, 60), 0.0
+    )
+    read = [white(run.stress / (1.0 + 3e-4 * run.stress), 0.01, lot) for run in exact]
+    runs = [replace(run, stress=stress) for run, stress in zip(exact, read, strict=True)]
     named = [name for name, effect in named_effects().items() if not effect.on_request]
     base = dc.Fluid(dc.make_law("ucm"), moduli, times)
-    effects = [*named, SATURATION]
-    found = dc.close_loop(data_of(records, sampled), base, held_out=["r4"], effects=effects)
+    data = dc.Dataset("saturated", tuple(runs))
+    found = dc.close_loop(data, base, held_out=["4"], effects=[*named, SATURATION])
     assert found.explanations.likeliest_first[0].members[0] == ("giesekus_mobility", "saturation")
 
 
 def test_n2_of_damping_by_strain_is_anything_that_a_simple_fluid_may_have():
     # K-BKZ by quadrature, N2 = −0.15 N1: one of the kernels that differ in N2 alone
     fluid, times = KBKZ(0.2, modulus=MODULUS, relaxation_time=TIME), np.linspace(0.05, 6.0, 60)
-    lot = np.random.default_rng(3)
-    stresses = [white(fluid.respond(flow_at(r), times).sigma12, 0.01, lot) for r in RATES.values()]
+    data = start_ups(fluid, RATES.values(), times, seed=3, names=[*RATES])
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     effects = ["strain_damping", "giesekus_mobility", "stress_gain"]
-    data = data_of(zip(RATES.items(), stresses, strict=True), times)
     loop = dc.close_loop(data, base, held_out=["d"], effects=effects)
     assert loop.explanations.likeliest_first[0].members[0] == ("strain_damping",)
     assert loop.answer.expected("N2").missing == "not determined"

@@ -15,10 +15,8 @@ from independent import (
     Thixotropic,
     UpperConvectedMaxwell,
 )
-from independent.flow import oscillation
 from independent.flow import start_up as flow_at
-from independent.noise import white
-from noisy_runs import run_at, start_ups
+from noisy_runs import run_at, start_ups, waves
 
 import discover as dc
 from discover.effects import make_effect
@@ -31,7 +29,6 @@ from discover.loop import run_loop
 from discover.loop.path import Path
 from discover.loop.preference import first_of, is_thixotropic_maxwell, law_of
 from discover.loop.task import EXTRAPOLATION, admission, candidates_of
-from discover.protocols import oscillatory_shear, shear_rates
 from discover.report.loop import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp", "pom_pom_drag_strain")
@@ -155,9 +152,7 @@ def first(misses, named, runs=6):
         ([0.0, 0.060], [False, True], 0),
     ],
 )
-def test_a_law_with_a_name_comes_first_where_it_misses_runs_by_about_as_much(
-    misses, named, comes_first
-):
+def test_a_law_with_a_name_comes_first_if_it_misses_by_as_much(misses, named, comes_first):
     assert first(misses, named) == comes_first
 
 
@@ -180,9 +175,7 @@ def test_how_much_more_it_may_miss_falls_with_the_number_of_runs(runs, ratio):
         ((), "ucm", False),
     ],
 )
-def test_a_maxwell_fluid_with_a_structure_and_nothing_else_is_thixotropic(
-    effects, law, thixotropic
-):
+def test_a_maxwell_fluid_with_a_structure_alone_is_thixotropic(effects, law, thixotropic):
     names = ["edge_fracture", "ptt_linear", "softening_by_work", "thixotropy"]
     problem = Problem(
         DeclaredModel.maxwell([100.0], [1.0]),
@@ -208,13 +201,9 @@ def test_a_maxwell_fluid_with_a_structure_and_nothing_else_is_thixotropic(
     ],
 )
 def test_release_without_constraints_is_told_as_strands_that_retract_partly(fluid, aliases):
-    times, lot, made = np.linspace(0.1, 12.0, 60), np.random.default_rng(0), []
-    for amplitude in (2.0, 4.0, 6.0):
-        flow = oscillatory_shear(amplitude, 1.0)
-        stress = white(fluid.respond(oscillation(amplitude, 1.0), times).sigma12, 0.01, lot)
-        made.append(dc.Run(f"{amplitude}", times, flow, shear_rates(flow, times), stress))
+    strands = waves(fluid, ((2.0, 1.0), (4.0, 1.0), (6.0, 1.0)), np.linspace(0.1, 12.0, 60))
     result = run_loop(
-        dc.Dataset("strands", tuple(made)), DeclaredModel.maxwell(100.0, 1.0),
+        strands, DeclaredModel.maxwell(100.0, 1.0),
         effects=("convective_constraint_release", "giesekus_mobility", "ptt_linear"),
         max_effects=1,
     )  # fmt: skip
@@ -291,9 +280,7 @@ SIZES = {LAW: 1, BENCH: 1, TWIN: 2}  # constants of each effect
         ),
     ],
 )  # fmt: skip
-def test_of_a_hypothesis_those_effects_are_reported_that_the_fitted_runs_show(
-    verdict, likelihoods, kept
-):
+def test_effects_are_reported_that_the_fitted_runs_show(verdict, likelihoods, kept):
     found = {
         frozenset(names): SimpleNamespace(
             names=tuple(sorted(names)), log_likelihood=value, at_an_end=()

@@ -84,9 +84,7 @@ def test_no_effect_is_attributed_to_noise(seed):
     assert result.noise_floor == pytest.approx(0.01, rel=0.25)
 
 
-def test_a_second_loop_of_other_effects_on_other_runs_compiles_nothing(
-    planted_mobility, monkeypatch
-):
+def test_a_second_loop_of_other_effects_and_runs_compiles_nothing(planted_mobility, monkeypatch):
     assert planted_mobility.stages
     kernels, programs, loaded = [], compilations(), code.callable_of
     monkeypatch.setattr(code, "callable_of", lambda *of: kernels.append(1) or loaded(*of))
@@ -121,9 +119,7 @@ def test_a_planted_rise_time_is_found_or_its_declared_alias():
     assert result.verdict == "effects_added"
 
 
-def test_the_json_follows_the_contract_and_records_hold_what_pictures_need(
-    planted_mobility, tmp_path
-):
+def test_json_follows_the_contract_and_records_hold_what_pictures_need(planted_mobility, tmp_path):
     planted_mobility.write_json(tmp_path / "loop.json")
     contents = json.loads((tmp_path / "loop.json").read_text())
     wanted = {"verdict", "error_before", "error_after", "noise_floor", "stages", "remaining"}

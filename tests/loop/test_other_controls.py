@@ -1,5 +1,6 @@
-"""What the loop says of creep, curves, sweeps and extension, by scipy and closed forms."""
+"""What the loop says of creep, curves, sweeps, extension and N1, by scipy and closed forms."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,9 @@ from independent.noise import white
 from independent.sweeps import giesekus_modulus, strain_at
 
 import discover as dc
+from discover.dataset import Dataset, Run
+from discover.loop import DeclaredModel, run_loop
+from discover.loop.runs import unfitted_runs
 from discover.protocols import in_flow, start_up
 from discover.report.predictions import loop_predictions
 from discover.study import parse_study
@@ -245,3 +249,56 @@ def test_a_band_in_a_flow_of_another_kind_holds_what_is_measured_there(effect, v
     assert all(record.band is not None for record in loop.records)
     # shear alone, unexplained: a gain that follows it says little of extension
     assert loop.held_in_band > 0.9
+
+
+WHEN = np.linspace(0.05, 6.0, 120)
+# an upper-convected Maxwell fluid in start-up   [Bird, Armstrong & Hassager 1987, vol. 1, ch. 7]
+GROWN = 1.0 - np.exp(-WHEN)
+NORMAL = 1.0 - np.exp(-WHEN) * (1.0 + WHEN)
+
+
+def with_normal(name, rate, factor=1.0):
+    lot = np.random.default_rng(int(100 * rate))
+    both = MODULUS * rate * GROWN, factor * 2.0 * MODULUS * rate**2 * NORMAL
+    noisy = [one + NOISE * np.std(one) * lot.standard_normal(len(one)) for one in both]
+    return Run(name, WHEN, start_up(rate), np.full(len(WHEN), rate), *noisy)
+
+
+def looped(*runs):
+    declared = DeclaredModel.maxwell(MODULUS, TIME)
+    return run_loop(
+        Dataset("made", runs), declared, effects=["ptt_linear", "stress_gain"], max_effects=1
+    )
+
+
+def test_recorded_n1_that_no_fit_saw_has_an_error_of_its_own():
+    result = looped(with_normal("slow", 0.3), with_normal("middle", 0.6), with_normal("fast", 1.2))
+    assert [one.name for one in result.unfitted] == ["slow (N1)", "middle (N1)", "fast (N1)"]
+    told = result.answer.expected("N1")
+    # the law is right: of 1 % of noise at most half is left, and of a gain as much
+    assert told.is_measured
+    assert told.inside < 0.01
+    # half as large, the record is missed by as much as it is
+    wrong = looped(*(with_normal(name, rate, 0.5) for name, rate in (("slow", 0.3), ("fast", 1.2))))
+    assert wrong.answer.expected("N1").inside == pytest.approx(1.0, rel=0.05)
+    assert wrong.verdict == result.verdict  # no judgement of σ12 knows of it
+    assert wrong.answer.next_test.startswith("Correct N1 for axial compliance, then fit it")
+
+
+def test_samples_of_n1_that_no_fluid_can_have_are_not_compared():
+    right = with_normal("right", 0.6)
+    negative = replace(
+        with_normal("wrong", 1.2),
+        first_normal_stress_difference=-with_normal("", 1.2).first_normal_stress_difference,
+    )
+    assert [one.name for one in looped(right, negative).unfitted] == ["right (N1)"]
+
+
+def test_a_part_of_a_run_without_a_sound_sample_of_n1_is_not_compared():
+    whole = with_normal("late", 1.2)
+    early = np.where(WHEN < 3.0, -1.0, 1.0) * whole.first_normal_stress_difference
+    whole = replace(whole, first_normal_stress_difference=early)
+    data = Dataset("made", (with_normal("right", 0.6), whole))
+    assert unfitted_runs(data, [whole.window(WHEN < 1.0)]) == []
+    (kept,) = unfitted_runs(data, [whole])  # control: of the whole with_normal the later part is
+    assert 2.0 < kept.time[0] < 4.0

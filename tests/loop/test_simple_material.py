@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from independent import Giesekus
 from independent.noise import white
-from noisy_runs import run_at
+from noisy_runs import run_at, run_of_wave
 
 import discover as dc
 from discover.answer.simple_material import SimpleMaterial, material_of
@@ -15,7 +15,7 @@ from discover.inference.engine.simple_materials import SimpleFit
 from discover.loop import run_loop
 from discover.loop.simple import check_of
 from discover.protocols import oscillations as oscillations_of
-from discover.protocols import oscillatory_shear, steady_rates
+from discover.protocols import steady_rates
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 RATES = np.geomspace(0.01, 100.0, 25)
@@ -91,9 +91,7 @@ def test_a_giesekus_flow_curve_is_no_yield_stress(alpha):
         assert material_in([curve], modulus=100.0) is None
 
 
-def test_where_a_law_that_relaxes_explains_all_few_predictions_say_that_nothing_simple_does(
-    monkeypatch,
-):
+def test_few_predictions_say_that_nothing_simple_explains_what_relaxes(monkeypatch):
     asked = []
     plain = simple_materials._ClosedForm.predict
 
@@ -128,11 +126,11 @@ def test_waves_of_one_frequency_that_may_have_gone_on_before_are_no_solid(noise)
     # closed form of a Maxwell fluid in steady alternation, ω = λ = 1; control: a start-up as well,
     # which a solid and a fluid do not follow alike
     times = np.linspace(0.0, 12.0, 120)
+    shape = np.sin(times) + np.cos(times)
     waves = [
-        Run(f"{size}", times, oscillatory_shear(size, 1.0), size * np.cos(times),
-            noisy(50.0 * size * (np.sin(times) + np.cos(times)), noise, seed))
+        run_of_wave(size, 1.0, times, noisy(50.0 * size * shape, noise, seed))
         for seed, size in enumerate((0.5, 2.0))
-    ]  # fmt: skip
+    ]
     assert material_in(waves) is None
     solid = material_in([*waves, *start_ups(lambda t, rate: rate * (50.0 * t + 50.0), noise)])
     assert solid.law == "kelvin_voigt"
@@ -204,8 +202,7 @@ def oscillations(stress, noise):
     for amplitude in (0.5, 5.0):
         rate, lot = amplitude * np.cos(times), np.random.default_rng(int(10 * amplitude))
         values = white(stress(times, rate, amplitude), noise, lot)
-        flow = oscillatory_shear(amplitude, 1.0)
-        runs.append(Run(f"{amplitude:g}", times, flow, rate, values))
+        runs.append(run_of_wave(amplitude, 1.0, times, values))
     return Dataset("oscillations", tuple(runs))
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus
+from independent import Giesekus, UpperConvectedMaxwell, of_rate
+from independent.noise import white
 from noisy_runs import run_at, start_ups
-from scipy.integrate import odeint
 
 import discover as dc
 from discover.dataset.records.repeats import count_flows
@@ -27,9 +27,8 @@ TO_FIT = replace(DECLARED, fit_modulus=True, fit_relaxation_time=True)
 
 def maxwell(rate):
     """Return σ' + σ = 100 γ̇ from rest, by scipy."""
-    fine = np.append(0.0, TIMES)
-    of_time = lambda t: np.interp(t, TIMES, rate)  # noqa: E731
-    return odeint(lambda y, t: 100.0 * of_time(t) - y, 0.0, fine, tcrit=None)[1:, 0]
+    flow = of_rate(lambda t: np.interp(t, TIMES, rate), TIMES[-1])
+    return UpperConvectedMaxwell(100.0).respond(flow, TIMES).sigma12
 
 
 def loop(stress, declared=DECLARED, effects=("stress_offset", "stress_gain"), **options):
@@ -126,8 +125,8 @@ def looped(*runs: dc.Run):
 
 
 def sheared(rate, seed=0):
-    (run,) = start_ups(Giesekus(0.3, 100.0), (rate,), np.linspace(0.1, 6.0, 40), seed=seed)
-    return replace(run, name=f"{rate:g}, {seed}")
+    times, name = np.linspace(0.1, 6.0, 40), f"{rate:g}, {seed}"
+    return start_ups(Giesekus(0.3, 100.0), (rate,), times, seed=seed, names=[name])[0]
 
 
 @pytest.mark.parametrize("repeated", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -171,8 +170,7 @@ def of_oil(rates, measured=False):
     """Return σ = η γ̇ₘ, γ̇ₘ = γ̇ (1 − exp(−t/t_m)), in closed form, with 1 % noise."""
     for seed, rate in enumerate(rates):
         behind = rate * -np.expm1(-SHORT / RISE)
-        size = 0.01 * VISCOSITY * np.sqrt(np.mean(behind**2))
-        stress = VISCOSITY * behind + size * np.random.default_rng(seed).standard_normal(60)
+        stress = white(VISCOSITY * behind, 0.01, np.random.default_rng(seed))
         run = run_at(rate, SHORT, stress)
         flow = dc.measured_rate(SHORT, behind)
         yield replace(run, protocol=flow, rate=behind, rate_is_measured=True) if measured else run

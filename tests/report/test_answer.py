@@ -154,12 +154,6 @@ def test_slow_oscillation_is_a_range_that_holds_steady_shear(slowest, said):
     assert "De" not in started.headline  # steady shear goes on for longer than any run
 
 
-def test_a_mean_error_says_how_large_it_may_be_over_new_runs():
-    assert MELT.discrepancy is not None
-    wide = replace(MELT, discrepancy=replace(MELT.discrepancy, ci95=(0.04, 0.12)))
-    assert "mean error 6 % (95 % CI 4–12 %) on 2 unseen runs, worst run 8 %" in wide.headline
-
-
 @pytest.mark.parametrize("given", [0.0, -0.1, 2.0])
 def test_a_tolerance_that_is_none_is_refused(given):
     with pytest.raises(InputError):

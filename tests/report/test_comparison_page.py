@@ -73,9 +73,7 @@ def test_a_term_is_determined_only_if_every_likely_law_has_it(arguments, sparse,
     assert told["tbnn_ude"].startswith(network)
 
 
-def test_a_part_that_cannot_be_drawn_is_one_sentence_and_the_others_are_drawn(
-    tmp_path, monkeypatch
-):
+def test_a_part_that_cannot_be_drawn_is_one_sentence_beside_the_others(tmp_path, monkeypatch):
     whole = page_of(made_up(), tmp_path / "whole")
     assert "could not be drawn" not in whole
 

@@ -5,10 +5,9 @@ import tomllib
 
 import numpy as np
 import pytest
+from command_line import invoke
 from independent.folders import maxwell_sweep, write_table
-from typer.testing import CliRunner
 
-from discover.cli.app import app
 from discover.cli.import_options import write_import_page
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
@@ -56,8 +55,8 @@ def show(tmp_path):
     """Return what shows a folder of sweeps, and where the page is to lie."""
     (tmp_path / "melt").mkdir()
     sweeps(tmp_path / "melt")
-    words = ["data", "show", str(tmp_path / "melt"), "--out", str(tmp_path / "seen")]
-    return lambda: CliRunner().invoke(app, words), tmp_path / "seen"
+    out = tmp_path / "seen"
+    return lambda **how: invoke("data", "show", tmp_path / "melt", "--out", out, **how), out
 
 
 def test_every_test_is_drawn_and_named_and_markup_in_a_name_is_text(tmp_path):
@@ -95,22 +94,19 @@ def test_the_study_to_start_from_loads_with_its_model(tmp_path, write):
 
 def test_the_command_writes_page_and_study_says_where_and_keeps_what_is_somebody_s(tmp_path, show):
     (look, out), folder = show, tmp_path / "melt"
-    shown = look()
-    assert shown.exit_code == 0
+    shown = look(code=0)
     assert "amplitude sweep" in shown.output
     assert str(folder) in (out / "study.toml").read_text()
     assert not [path for path in folder.iterdir() if path.suffix != ".csv"]
     assert look().output == shown.output  # of its own it makes new ones
     assert sorted(path.name for path in out.iterdir()) == ["data.html", "study.toml"]
     (out / "study.toml").write_text("changed by hand")
-    said = look()
-    assert said.exit_code == 0
+    said = look(code=0)
     assert said.output.replace("\n", " ").count("is kept") == 1
     assert (out / "study.toml").read_text() == "changed by hand"
 
     (out / "data.html").write_text("written by hand")
-    refused = look()
-    assert refused.exit_code == 2
+    look(code=2)
     assert (out / "data.html").read_text() == "written by hand"
 
 
@@ -118,9 +114,8 @@ def test_an_import_ends_in_a_page_and_keeps_a_study_changed_by_hand(tmp_path):
     export = tmp_path / "export.csv"
     write_table(export, maxwell_sweep([100.0], [1.0], OMEGA))
     out = tmp_path / "melt"
-    words = ["data", "import", str(export), "--out", str(out)]
-    said = CliRunner().invoke(app, words)
-    assert said.exit_code == 0, said.output
+    words = ["data", "import", export, "--out", out]
+    said = invoke(*words, code=0)
     page = (out / "data.html").read_text()
     assert drawn(page) == ["linear_sweep"]
     # what the block was taken for, and why, as the command itself says
@@ -131,9 +126,9 @@ def test_an_import_ends_in_a_page_and_keeps_a_study_changed_by_hand(tmp_path):
 
     (out / "study.toml").write_text("changed by hand")
     (out / "data.html").unlink()
-    assert CliRunner().invoke(app, [*words, "--overwrite", "--no-page"]).exit_code == 0
+    invoke(*words, "--overwrite", "--no-page", code=0)
     assert not (out / "data.html").exists()
-    assert CliRunner().invoke(app, [*words, "--overwrite"]).exit_code == 0
+    invoke(*words, "--overwrite", code=0)
     assert (out / "data.html").exists()
     assert (out / "study.toml").read_text() == "changed by hand"
 

@@ -85,6 +85,9 @@ def test_json_is_the_contract(comparison):
     assert term["coefficient_penalised"] == 0.19
     assert {"discrepancy", "adequate", "use", "posterior"} <= set(content)
     assert content["use"]["law"] == "giesekus"
+    assert content["adequate"] is True
+    assert learner["intervals_hold"] == "if_the_law_is_in_the_library"
+    assert learner["probability"] > 0.5
     assert "N2" in content["undetermined"]
     assert content["verdict"] == "explained"
     assert set(content["lack_of_fit"]) == set(content["learners"])
@@ -227,9 +230,7 @@ def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, pa
     assert widths[5] is None  # N2 is not determined
 
 
-def test_the_script_of_the_readme_draws_what_is_said_and_strain_is_the_integral_of_the_rate(
-    comparison,
-):
+def test_the_readme_s_script_draws_what_is_said_and_strain_integrates_the_rate(comparison):
     script = Path(__file__).parents[2] / "docs" / "picture.py"
     drawn = runpy.run_path(str(script))["draw"](comparison)
     assert drawn.name == "lissajous"

@@ -90,9 +90,7 @@ def test_a_loop_and_a_comparison_give_their_laws_modes_and_effects_with_values(t
     assert [known.name for known in model.effects] == ["stress_gain"]
 
 
-def test_a_law_is_taken_by_its_name_with_its_constants_and_terms_and_without_any_is_maxwells(
-    tmp_path,
-):
+def test_a_law_is_taken_by_name_with_constants_and_terms_or_is_maxwells(tmp_path):
     plain = {**LOOP, "declared": {"law": {**LAW, "terms": []}, "effects": []}}
     assert declared(write(tmp_path, "loop.json", plain)).law_name == "ucm"
     constants = {"stretch_time_ratio": 0.2, "beta": 0.5}
@@ -133,9 +131,7 @@ def test_constants_count_as_exact_with_intervals_said_unless_the_study_frees_the
 
 
 @pytest.mark.parametrize("name", ["loop.json", "comparison.json"])
-def test_what_is_unexplained_is_taken_with_the_doubt_said_where_there_is_more_than_maxwell(
-    tmp_path, name
-):
+def test_what_is_unexplained_is_taken_with_doubt_if_it_is_more_than_maxwell(tmp_path, name):
     """A law or an instrument that was declared, or an effect that was found."""
     doubtful = {**(LOOP if name == "loop.json" else COMPARISON), "verdict": "unexplained"}
     assert "did not explain" in declared(write(tmp_path, name, doubtful)).source
