@@ -66,7 +66,7 @@ class Program:
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
         choices = {}
         if isinstance(part, TransientFlows):
-            choices = {"cycles": part.cycle_steps > 0}
+            choices = {"cycles": bool(np.any(part.cycle >= 0))}
         kind = (
             type(part),
             jax.tree.structure(arrays),

@@ -66,7 +66,6 @@ class Kernel(Code):
 
     def __call__(
         self,
-        runs: int,
         tabled: int,
         used: np.ndarray,
         given: dict[str, np.ndarray],
@@ -78,8 +77,8 @@ class Kernel(Code):
         and their structure variables, (runs, ends, s, lanes), empty unless `normal`. `tabled`:
         modes whose weights stand in the table. `used`: parts that a vector needs; see `Flags`.
         """
-        steps, modes = given["width"].shape[1], len(given["mode"])
-        stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
+        (runs, steps), modes = given["width"].shape, len(given["mode"])
+        stress = np.full((runs, steps + 1, LANES), np.nan)
         felt, taken = np.zeros_like(stress), np.zeros(1, np.int64)
         of_modes = np.full((*stress.shape[:2], self.size if normal else 0, LANES), np.nan)
         of_modes[:, 0] = 0.0

@@ -326,7 +326,7 @@ class PeriodicSideBySide(StatePredictor):
                 "width": width, "share": np.ones(width.shape), "period": 2.0 * np.pi / frequency,
                 "jump": np.zeros(len(steps)), "flow": flows_of(None),
             }  # fmt: skip
-            _, _, of_modes = self._cycles()(len(steps), 0, used, given, normal=True)
+            _, _, of_modes = self._cycles()(0, used, given, normal=True)
             stress = np.where(ends[:, :, None], of_modes[:, 1:, 3], 0.0)
             return (np.sum(harmonic[:, :, None] * stress, axis=1) / amplitude).T
 

@@ -21,15 +21,14 @@ class Asked(NamedTuple):
     """What is asked of vectors of parameters.
 
     `moduli`: of the declared modes in Pa, the solvent's viscosity in Pa s last. `part`: runs of one
-    control. `runs`: how many are no padding. `whole`: whether behind what is recorded the stress
-    without what distorts a signal is asked for, and the components of the modes.
+    control. `whole`: whether behind what is recorded the stress without what distorts a signal is
+    asked for, and the components of the modes.
     """
 
     numbers: Numbers
     thetas: Float[np.ndarray, "trials p"]
     moduli: Float[np.ndarray, "trials c"]
     part: Any
-    runs: int
     whole: bool
 
     @property
