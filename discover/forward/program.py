@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -23,7 +23,6 @@ from discover.forward.flows import (
 from discover.forward.periodic_states import PHASE, first_harmonic
 from discover.forward.side_by_side import (
     Kernel,
-    PeriodicCode,
     PeriodicSideBySide,
     SideBySide,
     SteadyCode,
@@ -87,10 +86,9 @@ class Program:
             own = self._steady_rates, self._recorded_steady
             return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own)
         if control is PeriodicFlows:
-            code = code_of(PeriodicCode, *given)
+            code = code_of(Kernel, *given, cycles=True)
             own = self._steady_rates, self._given_way, self._moduli_recorded
-            in_cycles = partial(code_of, Kernel, *given, cycles=True)
-            return PeriodicSideBySide(self.fluid, code, in_cycles, *own)
+            return PeriodicSideBySide(self.fluid, code, *own)
         if control is StressFlows:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven)
