@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Complex, Float
 
 from discover.effects import KinematicEffect, RadialAverage, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -20,7 +21,6 @@ from discover.forward.flows import (
     StressFlows,
     TransientFlows,
 )
-from discover.forward.periodic_states import PHASE, first_harmonic
 from discover.forward.side_by_side import (
     Kernel,
     PeriodicSideBySide,
@@ -33,6 +33,23 @@ from discover.forward.side_by_side import (
 )
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
+
+# ωt at which what needs no steps is looked at: a stress beside the modes, a signal
+_PHASE = np.linspace(0.0, np.pi, 161)
+
+
+def _first_harmonic(
+    stress: Float[Array, " s"], phase: Float[Array | np.ndarray, " s"]
+) -> Complex[Array, ""]:
+    """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
+
+    G′ = (2/Tγ₀) ∫ σ sin ωt dt and G″ = (2/Tγ₀) ∫ σ cos ωt dt   [Hyun et al. 2011, Prog. Polym. Sci.
+    36, 1697]. `stress` in Pa over half a cycle, its ends included. `phase`: ωt there, 0 to π,
+    evenly spaced.
+    """
+    # of a periodic function the trapezoidal rule over a period is exact to all orders
+    share = jnp.ones(stress.shape).at[jnp.array([0, -1])].set(0.5) / (len(stress) - 1)
+    return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
 
 
 class Program:
@@ -165,9 +182,9 @@ class Program:
 
     def _whole(self, numbers, theta, strain, frequency, of_modes):
         """Return the modulus in Pa of all that is felt, and how far the tool turns over that."""
-        rate = strain * frequency * jnp.cos(PHASE)
+        rate = strain * frequency * jnp.cos(_PHASE)
         beside = self.fluid.beside(numbers, theta, rate, None)
-        whole = of_modes + first_harmonic(beside, PHASE) / strain
+        whole = of_modes + _first_harmonic(beside, _PHASE) / strain
         series = self.fluid.in_series(theta)
         if series is None:
             return whole, jnp.ones((), dtype=complex)
@@ -202,7 +219,7 @@ class Program:
         found = found * effect.response(values, frequency) - effect.inertia(values) * frequency**2
         if not effect.acts_on_steady_states:
             return found
-        phase, strain = PHASE, nominal / frequency
+        phase, strain = _PHASE, nominal / frequency
         stress = strain * (found.real * jnp.sin(phase) + found.imag * jnp.cos(phase))
         # at the ends of the stroke the tool is at rest, whatever the rounding
         rate = nominal * jnp.where(jnp.abs(jnp.cos(phase)) < 1e-9, 0.0, jnp.cos(phase))
@@ -212,7 +229,7 @@ class Program:
             )
             for sign in (1.0, -1.0)
         )
-        return first_harmonic(0.5 * (there - back), phase) / strain
+        return _first_harmonic(0.5 * (there - back), phase) / strain
 
     def _driven(self, theta, present, run: StressFlows):
         """Return the true stress of runs at a given one in Pa, and the tool's inertia in Pa s².
