@@ -80,36 +80,30 @@ class Program:
             flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        choices = {}
-        if isinstance(part, TransientFlows):
-            choices = {"cycles": bool(np.any(part.cycle >= 0))}
         kind = (
             type(part),
             jax.tree.structure(arrays),
             shapes,
             *jax.tree.leaves(rest),
             flow is None,
-            *choices.values(),
         )
         if kind not in self._kernels:
-            self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
+            self._kernels[kind] = self._in_lanes(numbers, type(part), flow)
         return self._kernels[kind]
 
-    def _in_lanes(
-        self, numbers: Numbers, control: type, flow: Kinematics | None, choices: dict[str, bool]
-    ):
+    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None):
         given = self.fluid, numbers, flow
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
             return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own)
         if control is PeriodicFlows:
-            code = code_of(Kernel, *given, cycles=True)
+            code = code_of(Kernel, *given)
             own = self._steady_rates, self._given_way, self._moduli_recorded
             return PeriodicSideBySide(self.fluid, code, *own)
         if control is StressFlows:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven)
-        kernel = code_of(Kernel, *given, **choices)
+        kernel = code_of(Kernel, *given)
         return SideBySide(self.fluid, kernel, self._rates, self._distorted)
 
     # Rates and records of many vectors and runs, in arrays of NumPy with axes of these and of time;
