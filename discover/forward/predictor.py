@@ -19,7 +19,7 @@ from discover.forward.flows import (
 )
 from discover.forward.program import Program
 from discover.forward.side_by_side import Asked, MadeOnce
-from discover.programs.threads import on_device
+from discover.programs import on_device
 from discover.protocols.kinematics import normal_stress_differences
 
 

@@ -6,16 +6,16 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from discover.programs import in_threads, threads
+from discover.programs import compiler, in_threads
 
 
 @pytest.fixture(autouse=True)
 def in_threads_whoever_runs_the_tests(monkeypatch):
-    monkeypatch.setattr(threads, "ThreadPoolExecutor", ThreadPoolExecutor)
-    monkeypatch.setattr(threads, "_WORKERS", 2)
-    threads._pool.cache_clear()
+    monkeypatch.setattr(compiler, "ThreadPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr(compiler, "_WORKERS", 2)
+    compiler._pool.cache_clear()
     yield
-    threads._pool.cache_clear()
+    compiler._pool.cache_clear()
 
 
 @pytest.mark.parametrize("is_compiled", [False, True])
