@@ -142,7 +142,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """Call programs in turn; all tests are imported, in a worker, by now."""
     if hasattr(session.config, "workerinput"):
         # to start threads for every call of a program takes a tenth of a fit's processor
-        importlib.import_module("discover.programs.threads").ThreadPoolExecutor = _InTurn
+        importlib.import_module("discover.programs.compiler").ThreadPoolExecutor = _InTurn
 
 
 def pytest_unconfigure() -> None:

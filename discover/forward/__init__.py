@@ -4,10 +4,9 @@
 declared law, then those of every candidate effect. At zero amplitude an effect changes nothing.
 """
 
-from discover.forward.augmented_model import AugmentedModel
+from discover.forward.augmented_model import AugmentedModel, data_scales
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 from discover.forward.flows import Batch, TransientFlows, make_batch
-from discover.forward.scales import data_scales
 
 __all__ = [
     "MODULUS",

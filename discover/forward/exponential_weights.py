@@ -76,18 +76,6 @@ class KrogstadWeights(NamedTuple):
     b4: Numbers
     m4: Numbers
 
-    def tableau(self) -> tuple[Float[Array, "4 ..."], Float[Array, "4 4 ..."]]:
-        """Return what each stage multiplies the state with, and the remainders of all stages."""
-        none = jnp.zeros_like(self.a21)
-        rows = (
-            (none, none, none, none),
-            (self.a21, none, none, none),
-            (self.a31, self.a32, none, none),
-            (self.a41, none, self.a43, none),
-        )
-        kept = jnp.stack([jnp.ones_like(self.half), self.half, self.half, self.full])
-        return kept, jnp.stack([jnp.stack(row) for row in rows])
-
     def second(self, y, n1):
         """Return Y2, of the state and the remainder there; shapes that broadcast, as below."""
         return self.half * y + self.a21 * n1
@@ -161,35 +149,8 @@ class StressWeights(NamedTuple):
     ) -> tuple[Float[Array, "s *c k"], Any]:
         """Return the stress after a step, and what else each stage says.
 
-        A scan, so that what a stage does is compiled once and not four times. `stage`: from stress
-        and its share of `inputs` to `remainder` and more.
+        `stage`: from stress and its share of `inputs` to `remainder` and more.
         """
-        if self.beside:
-            return self._step_by_step(stress, stage, inputs)
-        beside = (1,) * (stress.ndim - 1)
-        rows = [self.whole.tableau()]
-        if self.trace is not None:
-            rows.append(self.trace.tableau())
-
-        def one(remainders, given):
-            number, tableau, own = given
-            (kept, weights), *of_trace = tableau
-            weights = weights.reshape(4, *beside, -1)
-            state = kept * stress + jnp.sum(weights * remainders, axis=0)
-            for other_kept, other in of_trace:
-                mean = (other_kept - kept) * _mean_normal(stress)
-                means = jax.vmap(_mean_normal)(remainders)
-                apart = other.reshape(4, *beside[1:], -1) - weights[:, 0]
-                state = state.at[:3].add(mean + jnp.sum(apart * means, axis=0))
-            found, more = stage(state, own)
-            return remainders.at[number].set(found), more
-
-        start = jnp.zeros((4, *stress.shape), stress.dtype)
-        remainders, more = jax.lax.scan(one, start, (jnp.arange(4), rows, inputs))
-        return self.end(stress, *remainders), more
-
-    def _step_by_step(self, stress, stage, inputs):
-        """Return what `step` does, where each tensor of the law has weights of its own."""
         given = [jax.tree.map(lambda leaf, i=i: leaf[i], inputs) for i in range(4)]
         n1, first = stage(stress, given[0])
         n2, second = stage(self.second(stress, n1), given[1])

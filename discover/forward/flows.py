@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -13,7 +13,6 @@ from jaxtyping import Float, Int
 
 from discover.dataset import Run
 from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
-from discover.forward.rate_steps import RateSteps, rate_steps
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 
@@ -28,8 +27,73 @@ _LONG, _GROWTH = 2000, 0.05
 # how far their widths may differ for rounding, and rates from a straight line
 _MANY_IN_A_ROW, _SHARES, _ALIKE, _STRAIGHT = 8, 4, 1e-6, 1e-10
 
-# Least sizes of arrays that data sets share; of runs where they have no more steps than that
-_MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
+# Time in s of steps of the rate that pad a run which has fewer
+_NEVER = -1.0
+
+
+class RateSteps(eqx.Module):
+    """Steps of the rate between two samples, with a leading axis of runs.
+
+    `start`, `end`: times of the samples in s; padding lies before any record. `share`: of the
+    interval at whose end the rate steps, where not fitted. `place`: of its fitted share; −1 where
+    not fitted.
+    """
+
+    start: Float[np.ndarray, "*runs steps"]
+    end: Float[np.ndarray, "*runs steps"]
+    change: Float[np.ndarray, "*runs steps"]  # of the rate in 1/s
+    share: Float[np.ndarray, "*runs steps"]
+    place: Int[np.ndarray, "*runs steps"]
+
+    def in_rate(
+        self,
+        rate: Float[np.ndarray, "runs m"],
+        times: Float[np.ndarray, "runs m"],
+        fitted: Float[np.ndarray, "fitted vectors 1 1"],
+    ) -> Float[np.ndarray, "vectors runs m"]:
+        """Return the rate of runs with its steps where they happen.
+
+        Between the two samples Simpson's rule gives the strain of each step of the integration, so
+        that rates change smoothly with the instant. `rate`, `times`: at ends and middles of steps
+        in turn, in 1/s and s, with a straight line where the rate steps. `fitted`: the fitted
+        shares.
+        """
+        share = np.broadcast_to(self.share, (fitted.shape[1], *self.share.shape))
+        if len(fitted):
+            share = np.where(self.place < 0, share, np.moveaxis(fitted[self.place, :, 0, 0], -1, 0))
+        ends = times[:, ::2]
+        first, last = ends[:, :-1], ends[:, 1:]
+        # of the two steps that meet at an end; beyond those of the record there is none
+        reach = np.pad(ends[:, 2:] - ends[:, :-2], ((0, 0), (1, 1)), constant_values=1.0)
+        total = np.broadcast_to(rate, (len(share), *rate.shape)).copy()
+        for k in range(self.start.shape[1]):
+            start, end, change = (of[:, k, None] for of in (self.start, self.end, self.change))
+            instant = start + share[:, :, k, None] * (end - start)
+            at_ends = np.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
+            at_ends = np.where(ends <= start, 0.0, np.where(ends >= end, 1.0, at_ends))
+            strain = np.clip((last - instant) / (last - first), 0.0, 1.0)
+            stepped = np.zeros_like(total)
+            stepped[..., ::2] = at_ends
+            stepped[..., 1::2] = 1.5 * strain - 0.25 * (at_ends[..., :-1] + at_ends[..., 1:])
+            straight = np.clip((times - start) / (end - start), 0.0, 1.0)
+            between = (times > start) & (times < end)
+            total += change * np.where(between, stepped - straight, 0.0)
+        return total
+
+
+def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
+    """Return the steps of runs whose instants are fitted or were; None where there is none."""
+    most = max(len(run.rate_steps) for run in runs)
+    if not most:
+        return None
+    rows = np.full((len(runs), most, 4), [_NEVER - 1.0, _NEVER, 0.0, 0.5])
+    place = np.full((len(runs), most), -1)
+    for i, run in enumerate(runs):
+        for k, step in enumerate(run.rate_steps):
+            rows[i, k] = step.start, step.end, step.change, step.share
+            place[i, k] = -1 if step.place is None else step.place
+    start, end, change, share = np.moveaxis(rows, -1, 0)
+    return RateSteps(start, end, change, share, place)
 
 
 class TransientFlows(eqx.Module):
@@ -54,51 +118,6 @@ class TransientFlows(eqx.Module):
     pieces: Int[np.ndarray, "runs s"]
     kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
-    cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
-
-    def in_shared_shape(self) -> "TransientFlows":
-        """Return these runs padded to one of few shapes, so that data sets share programs."""
-        times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
-        samples = _rounded(self.sample_index.shape[1], _SAMPLES)
-        step_ends = _rounded((times.shape[1] + 1) // 2, _STEPS)
-        half_steps = 2 * step_ends - 1
-        # of long runs a few more are not for nothing
-        runs = _rounded(len(times), _MANY_RUNS if step_ends == _STEPS else 1)
-        spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
-        later = times[:, -1:] + spacing * np.arange(1, half_steps - times.shape[1] + 1)
-        # a straight line for one step more: the slope of the rate at the last sample stays as it is
-        one_more = (2.0 * rate[:, -1:] - rate[:, [-2, -3]])[:, : later.shape[1]]
-        longer = replace(
-            self,
-            times=np.concatenate([times, later], axis=1),
-            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), half_steps),
-            sample_index=_longer(self.sample_index, samples, "edge"),
-            pieces=np.maximum(_longer(self.pieces, step_ends - 1), 1),
-            steps=self.steps and self.steps.padded(_rounded(self.steps.start.shape[1], 1)),
-        )
-        return jax.tree.map(lambda values: _more_runs(values, runs), longer)
-
-
-def _rounded(size: int, least: int) -> int:
-    """Return the next of least × 1, 1.5, 2, 3, 4, 6, ... in whole numbers."""
-    while size > least:
-        if size <= 3 * least // 2:
-            return 3 * least // 2
-        least *= 2
-    return least
-
-
-def _longer(
-    values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant"
-) -> np.ndarray:
-    beyond = size - np.shape(values)[1]
-    return np.pad(np.asarray(values), ((0, 0), (0, beyond)), mode)
-
-
-def _more_runs(values: ArrayLike, runs: int) -> np.ndarray:
-    values = np.asarray(values)
-    more = [(0, runs - len(values)), *[(0, 0)] * (values.ndim - 1)]
-    return np.pad(values, more, "edge")
 
 
 class Steps(NamedTuple):
@@ -139,9 +158,6 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         np.searchsorted(grid, run.protocol.cycle) if np.ptp(run.protocol.cycle) else (-1, -1)
         for run, (grid, *_) in zip(runs, grids, strict=True)
     ]
-    cycle_steps = int(max(end - start for start, end in cycles))
-    if cycle_steps:
-        n_steps = max(n_steps, *(int(start) + cycle_steps + 1 for start, _ in cycles))
     rows = []
     for run, cycle, (grid, index, pieces) in zip(runs, cycles, grids, strict=True):
         spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
@@ -170,7 +186,6 @@ def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlow
         *columns,
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
         steps=rate_steps(runs),
-        cycle_steps=cycle_steps,
     )
 
 

@@ -16,11 +16,11 @@ from jaxtyping import Array, Float, Inexact
 
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.grid import IntegrationGrid
-from discover.forward.periodic_states import periodic_state
 from discover.forward.stepping import (
     answer_to_stress,
     begun,
     follow,
+    periodic_modes,
     without_derivatives,
 )
 from discover.laws.each_mode import of_each_mode, over_modes
@@ -108,8 +108,7 @@ def solved_on_grid(
 
     def one(number):
         strain, rate = protocol.strain_in_table(number), protocol.rate(number)
-        found = periodic_state(dynamics, fixed, strain, rate / strain, phase)
-        return AtSamples(found.modulus * jnp.array([1.0, 0.0, 0.0]), found.stress.T, rate)
+        return _in_alternation(dynamics, fixed, strain, rate, phase)
 
     # alike ones side by side, for all of a group take as many steps as the slowest
     order = jnp.argsort(-jax.vmap(protocol.strain_in_table)(grid.times))
@@ -118,6 +117,32 @@ def solved_on_grid(
     found = jax.lax.map(jax.vmap(one), grid.times[places].reshape(-1, size))
     of_sample = jnp.argsort(order)[grid.sample_index]  # not those that pad a record
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[of_sample], found)
+
+
+def _in_alternation(
+    dynamics: Dynamics, fixed: Dynamics, strain: Float[Array, ""], rate: Float[Array, ""],
+    phase: Float[Array, " m"],
+) -> AtSamples:  # fmt: skip
+    """Return what is seen of one oscillation; see `AtSamples`.
+
+    `strain`, `rate`: amplitudes. `phase`: ωt at step ends and middles in turn over half a cycle.
+    """
+    wave, frequency = rate * jnp.cos(phase), rate / strain
+    rates = jnp.stack([wave[:-2:2], wave[1::2], wave[2::2]], axis=1)
+    width = jnp.full(len(rates), (phase[2] - phase[0]) / frequency)
+    count, period = jnp.asarray(len(rates)), 2.0 * jnp.pi / frequency
+    start = periodic_modes(dynamics, fixed, rates, width, count, period, None, mirrored=True)
+
+    def step(stress, inputs):
+        weights, rates = inputs
+        after = dynamics.stepped(weights, stress, rates, None)
+        return after, dynamics.recorded(after, None)
+
+    _, stress = jax.lax.scan(step, start, (dynamics.weights(width), rates))
+    stress = stress + dynamics.viscosity * rates[:, 2]
+    # of a periodic function the sum over a period is exact to all orders, and over half of it here
+    modulus = 2j * jnp.mean(jnp.exp(-1j * phase[2::2]) * stress) / strain
+    return AtSamples(modulus * jnp.array([1.0, 0.0, 0.0]), start.T, rate)
 
 
 def _at_given_stress(

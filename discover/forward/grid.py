@@ -383,15 +383,9 @@ def make_grids(
     strain_step = limits.get("strain_step", STRAIN_STEP)
     step = min(4.0 * strain_step, max(_STRAIN_OF_CYCLE, 2.0 * strain_step))
     step /= limits.get("pieces", 1)
-    phase = half_cycle(largest, step)
-    phases = on_device(np.tile(phase, (len(grids), 1)))
+    steps = steps_of_half_cycle(max(largest, 0.5 * _FEWEST_OF_HALF), step)
+    phases = on_device(np.tile(np.linspace(0.0, np.pi, 2 * steps + 1), (len(grids), 1)))
     return IntegrationGrid(all_times, indices, phases)
-
-
-def half_cycle(strain: float, strain_step: float) -> Float[np.ndarray, " m"]:
-    """Return ωt at step ends and middles in turn over half a cycle of an oscillation."""
-    steps = steps_of_half_cycle(max(strain, 0.5 * _FEWEST_OF_HALF), strain_step)
-    return np.linspace(0.0, np.pi, 2 * steps + 1)
 
 
 def steps_of_half_cycle(strain: float, strain_step: float) -> int:

@@ -15,12 +15,11 @@ from discover.forward.flows import (
     Flows,
     PeriodicFlows,
     Places,
-    TransientFlows,
     at_radii,
 )
 from discover.forward.program import Program
 from discover.forward.side_by_side import Asked, MadeOnce
-from discover.programs.threads import on_device
+from discover.programs import on_device
 from discover.protocols.kinematics import normal_stress_differences
 
 
@@ -40,8 +39,6 @@ class Predictor:
     def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
-        # runs as a program takes them, and those at the radii of an average
-        self._in_shared_shape = MadeOnce(lambda part: part.in_shared_shape())
         self._inside = MadeOnce(_inside)
 
     @cached_property
@@ -116,27 +113,20 @@ class Predictor:
         """Return the records of a part without what averages over radii."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
-            return _of_sweeps(self._of_runs(trials, part, 0, False), batch.moduli)[..., None]
-        if not isinstance(part, TransientFlows):
-            return self._of_runs(trials, part, 0, whole)
-        runs, samples = part.sample_index.shape
-        # without effects no program follows that others could share
-        shared = (
-            self._in_shared_shape(part) if self.of_every_effect.fluid.structure.effects else part
-        )
-        return self._of_runs(trials, shared, runs, whole)[:, :runs, :samples]
+            return _of_sweeps(self._of_runs(trials, part, False), batch.moduli)[..., None]
+        return self._of_runs(trials, part, whole)
 
     def side_by_side(self, part: Flows) -> Any:
         """Return what predicts many vectors of a part at once."""
         return self.of_every_effect.side_by_side(self._numbers, part)
 
     def _of_runs(
-        self, trials: Trials, part: Flows, runs: int, whole: bool
+        self, trials: Trials, part: Flows, whole: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
-        asked = Asked(self._numbers, vectors, trials.moduli, part, runs, whole)
+        asked = Asked(self._numbers, vectors, trials.moduli, part, whole)
         return self.side_by_side(part).predict(asked)
 
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Complex, Float
 
 from discover.effects import KinematicEffect, RadialAverage, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -20,10 +21,8 @@ from discover.forward.flows import (
     StressFlows,
     TransientFlows,
 )
-from discover.forward.periodic_states import PHASE, first_harmonic
 from discover.forward.side_by_side import (
     Kernel,
-    PeriodicCode,
     PeriodicSideBySide,
     SideBySide,
     SteadyCode,
@@ -34,6 +33,23 @@ from discover.forward.side_by_side import (
 )
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
+
+# ωt at which what needs no steps is looked at: a stress beside the modes, a signal
+_PHASE = np.linspace(0.0, np.pi, 161)
+
+
+def _first_harmonic(
+    stress: Float[Array, " s"], phase: Float[Array | np.ndarray, " s"]
+) -> Complex[Array, ""]:
+    """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
+
+    G′ = (2/Tγ₀) ∫ σ sin ωt dt and G″ = (2/Tγ₀) ∫ σ cos ωt dt   [Hyun et al. 2011, Prog. Polym. Sci.
+    36, 1697]. `stress` in Pa over half a cycle, its ends included. `phase`: ωt there, 0 to π,
+    evenly spaced.
+    """
+    # of a periodic function the trapezoidal rule over a period is exact to all orders
+    share = jnp.ones(stress.shape).at[jnp.array([0, -1])].set(0.5) / (len(stress) - 1)
+    return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
 
 
 class Program:
@@ -64,37 +80,30 @@ class Program:
             flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        choices = {}
-        if isinstance(part, TransientFlows):
-            choices = {"cycles": part.cycle_steps > 0}
         kind = (
             type(part),
             jax.tree.structure(arrays),
             shapes,
             *jax.tree.leaves(rest),
             flow is None,
-            *choices.values(),
         )
         if kind not in self._kernels:
-            self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
+            self._kernels[kind] = self._in_lanes(numbers, type(part), flow)
         return self._kernels[kind]
 
-    def _in_lanes(
-        self, numbers: Numbers, control: type, flow: Kinematics | None, choices: dict[str, bool]
-    ):
+    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None):
         given = self.fluid, numbers, flow
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
             return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own)
         if control is PeriodicFlows:
-            code = code_of(PeriodicCode, *given)
+            code = code_of(Kernel, *given)
             own = self._steady_rates, self._given_way, self._moduli_recorded
-            in_cycles = partial(code_of, Kernel, *given, cycles=True)
-            return PeriodicSideBySide(self.fluid, code, in_cycles, *own)
+            return PeriodicSideBySide(self.fluid, code, *own)
         if control is StressFlows:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven)
-        kernel = code_of(Kernel, *given, **choices)
+        kernel = code_of(Kernel, *given)
         return SideBySide(self.fluid, kernel, self._rates, self._distorted)
 
     # Rates and records of many vectors and runs, in arrays of NumPy with axes of these and of time;
@@ -167,9 +176,9 @@ class Program:
 
     def _whole(self, numbers, theta, strain, frequency, of_modes):
         """Return the modulus in Pa of all that is felt, and how far the tool turns over that."""
-        rate = strain * frequency * jnp.cos(PHASE)
+        rate = strain * frequency * jnp.cos(_PHASE)
         beside = self.fluid.beside(numbers, theta, rate, None)
-        whole = of_modes + first_harmonic(beside, PHASE) / strain
+        whole = of_modes + _first_harmonic(beside, _PHASE) / strain
         series = self.fluid.in_series(theta)
         if series is None:
             return whole, jnp.ones((), dtype=complex)
@@ -204,7 +213,7 @@ class Program:
         found = found * effect.response(values, frequency) - effect.inertia(values) * frequency**2
         if not effect.acts_on_steady_states:
             return found
-        phase, strain = PHASE, nominal / frequency
+        phase, strain = _PHASE, nominal / frequency
         stress = strain * (found.real * jnp.sin(phase) + found.imag * jnp.cos(phase))
         # at the ends of the stroke the tool is at rest, whatever the rounding
         rate = nominal * jnp.where(jnp.abs(jnp.cos(phase)) < 1e-9, 0.0, jnp.cos(phase))
@@ -214,7 +223,7 @@ class Program:
             )
             for sign in (1.0, -1.0)
         )
-        return first_harmonic(0.5 * (there - back), phase) / strain
+        return _first_harmonic(0.5 * (there - back), phase) / strain
 
     def _driven(self, theta, present, run: StressFlows):
         """Return the true stress of runs at a given one in Pa, and the tool's inertia in Pa s².

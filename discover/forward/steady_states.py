@@ -1,4 +1,4 @@
-"""Newton's steps towards states that a flow keeps, and steady states of modes."""
+"""Newton's steps towards states that a flow keeps: periodic ones, and steady ones of modes."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -12,6 +12,9 @@ from discover.protocols.kinematics import Kinematics
 
 FROM_REST = 2
 """Cycles from rest before Newton's steps."""
+
+MOST, TOLERANCE = 40, 1e-7
+"""Most iterations for a cycle, and the relative change that ends them."""
 
 # A step that made things worse is tried again this much shorter; below the other, it is rounding
 _SHORTER, _EXACT = 0.25, 1e-12
@@ -116,6 +119,52 @@ def relative_change(
 
 def _size(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
     return jnp.max(jnp.abs(stress), axis=0)
+
+
+class _Iterate(NamedTuple):
+    """An approximation to the modes, and by how much they moved last."""
+
+    modes: Approximation
+    change: Float[Array, ""]
+
+
+def periodic_start(
+    after_cycle: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    rest: Float[Array, "s k"],
+    slowness: Float[Array, " k"],
+    is_periodic: Bool[Array, ""],
+) -> Float[Array, "s k"]:
+    """Return modes that a whole cycle brings back; not a number where none are found.
+
+    Solved for and not waited for, by Newton's steps along the components of each mode, which change
+    nearly by themselves   [shooting: Stoer & Bulirsch 2002, Introduction to Numerical Analysis,
+    section 7.3; `next_approximation`].
+
+    `after_cycle`: from modes to what they are a cycle later. `slowness`: relaxation times, in
+    cycles. `is_periodic`: where not, `rest` is returned.
+    """
+
+    def improved(now: _Iterate) -> _Iterate:
+        def along(unit):
+            direction = unit[:, None] * jnp.ones(rest.shape)
+            return jax.jvp(after_cycle, (now.modes.stress,), (direction,))
+
+        after, slopes = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(rest)))
+        jacobian = jnp.moveaxis(slopes, 2, 0)  # mode, direction, component
+        modes, better = next_approximation(now.modes, after, jacobian)
+        change = relative_change(now.modes, modes, slowness, TOLERANCE)
+        change = jnp.where(is_periodic, jnp.where(jnp.all(better), change, jnp.inf), 0.0)
+        return _Iterate(modes, change)
+
+    # the cycles from rest need no derivative
+    begun = jax.lax.fori_loop(0, FROM_REST, lambda _, stress: after_cycle(stress), rest)
+    end = jax.lax.while_loop(
+        lambda now: goes_on(now.modes, now.change, MOST, TOLERANCE),
+        improved,
+        _Iterate(first_approximation(begun, FROM_REST), jnp.asarray(jnp.inf)),
+    )
+    found = jnp.where(end.change < TOLERANCE, end.modes.stress, jnp.nan)
+    return jnp.where(is_periodic, found, rest)
 
 
 # A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with the width of so

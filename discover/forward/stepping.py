@@ -7,12 +7,12 @@ from typing import NamedTuple, TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PyTree
+import numpy as np
+from jaxtyping import Array, Float, Int, PyTree
 
 from discover.forward.dynamics import Dynamics
 from discover.forward.grid import IntegrationGrid
-from discover.forward.periodic_states import periodic_start
-from discover.forward.steady_states import steady_state
+from discover.forward.steady_states import periodic_start, steady_state
 from discover.protocols.kinematics import Kinematics
 from discover.protocols.protocol import FlowProtocol
 from tensor_library.algebra import VelocityGradient, contracted
@@ -68,30 +68,45 @@ def follow(
 def begun(
     dynamics: Dynamics, fixed: Dynamics, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> Float[Array, "s *c k"]:
-    """Return the modes at the start of a grid: at rest, or periodic where it begins with a cycle.
+    """Return the modes where a grid begins: at rest, or periodic where that is a cycle."""
+    if grid.cycle is None:
+        return dynamics.rest()
+    rate, width = (of[: grid.cycle_steps] for of in _stepped(protocol, grid))
+    period = grid.times[grid.cycle] - grid.times[0]
+    return periodic_modes(dynamics, fixed, rate, width, grid.cycle, period, protocol.kinematics)
 
-    A periodic state is solved for without derivatives; one step of Newton's method from there moves
-    it by nothing, and its derivatives to those of the implicit function.
+
+def periodic_modes(
+    dynamics: Dynamics, fixed: Dynamics, rate: Float[Array, "steps 3"],
+    width: Float[Array, " steps"], count: Int[Array, ""], period: Float[Array, ""],
+    flow: Kinematics | None, mirrored: bool = False,
+) -> Float[Array, "s *c k"]:  # fmt: skip
+    """Return the modes that a cycle of `count` steps brings back; at rest where there are none.
+
+    The state is solved for without derivatives; one step of Newton's method from there moves it by
+    nothing, and its derivatives to those of the implicit function. `rate`: at the beginning, middle
+    and end of each step, in 1/s. `width`, `period`: of a step and the cycle, in s. `mirrored`:
+    whether it is half a cycle, after which the flow is its own image in the plane across it.
     """
     rest = dynamics.rest()
-    if grid.cycle is None:
-        return rest
-    rate, width = (of[: grid.cycle_steps] for of in _stepped(protocol, grid))
+    signs = np.ones((len(rest), *(1,) * (rest.ndim - 1)))
+    if mirrored:
+        signs[3 : 4 * (1 + dynamics.tensors) : 4] = -1.0
 
     def after_cycle(fluid: Dynamics, stress):
         def step(stress, inputs):
-            number, rates, width = inputs
-            after = fluid.after_step(stress, rates, width, protocol.kinematics)
-            return jnp.where(number < grid.cycle, after, stress), None
+            number, rates, weights = inputs
+            after = fluid.stepped(weights, stress, rates, flow)
+            return jnp.where(number < count, after, stress), None
 
-        return jax.lax.scan(step, stress, (jnp.arange(grid.cycle_steps), rate, width))[0]
+        steps = jnp.arange(len(width)), rate, fluid.weights(width)
+        return signs * jax.lax.scan(step, stress, steps)[0]
 
     def along(unit):
         direction = unit[:, None] * jnp.ones_like(state)
         return jax.jvp(lambda stress: after_cycle(fixed, stress), (state,), (direction,))[1]
 
-    is_periodic = grid.cycle > 0
-    period = grid.times[grid.cycle] - grid.times[0]
+    is_periodic = count > 0
     slowness = fixed.modes.relaxation_time / jnp.where(period > 0.0, period, 1.0)
     state = periodic_start(partial(after_cycle, fixed), fixed.rest(), slowness, is_periodic)
     state = jax.lax.stop_gradient(state)

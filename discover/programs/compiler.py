@@ -1,22 +1,29 @@
-"""Functions compiled by JAX with options for loops of small steps."""
+"""Functions compiled by JAX with options for loops of small steps, and called side by side."""
 
 import functools
 import gc
 import itertools
 import logging
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
+from jax.typing import ArrayLike
+from jaxtyping import Array
 
 _LOGGER = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 R = TypeVar("R")
+Job = TypeVar("Job")
 
 _PIECES = Path("/proc/self/maps")  # on Linux; other systems have no such limit
 _LIMIT = Path("/proc/sys/vm/max_map_count")
@@ -93,3 +100,47 @@ def _if_known(options: dict[str, Any]) -> dict[str, Any]:
     except jax.errors.JaxRuntimeError:
         return {}
     return options
+
+
+_WORKERS = min(os.cpu_count() or 1, 4)
+
+
+@functools.cache
+def _pool() -> ThreadPoolExecutor:
+    """Return the one pool of this process: to start threads takes as long as a short program."""
+    return ThreadPoolExecutor(_WORKERS)
+
+
+# a process made by copying this one has none of its threads
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def in_threads(
+    function: Callable[[Job], R], jobs: Iterable[Job], is_compiled: bool = False
+) -> list[R]:
+    """Return what a function makes of each job, in their order.
+
+    `function`: calls a compiled program, which leaves Python to the others. `is_compiled`: whether
+    that has met jobs of this shape; if not, the first runs alone, so that it is compiled once.
+    """
+    waiting = list(jobs)
+    done = [] if is_compiled else [function(job) for job in waiting[:1]]
+    waiting = waiting[len(done) :]
+    if len(waiting) < 2:
+        return done + [function(job) for job in waiting]
+    # what numpy was told of overflows holds in the threads too
+    each = [copy_context() for _ in waiting]
+    return done + list(_pool().map(lambda own, job: own.run(function, job), each, waiting))
+
+
+def on_device(values: ArrayLike) -> Array:
+    """Return numbers, or an array of NumPy's, as an array of JAX's; one of JAX's stays as it is.
+
+    Told no type, `jax.numpy.asarray` compiles a copy for every new shape, some 10 ms each; told the
+    one that the array has, it only copies.
+    """
+    if isinstance(values, jax.Array | float | int):  # a number of Python's has no type of its own
+        return jnp.asarray(values)
+    held = np.asarray(values)
+    return jnp.asarray(held, held.dtype)

@@ -119,16 +119,6 @@ def test_values_that_are_new_or_repeat_by_chance_are_not_told_as_held(folder, ke
     assert not any("looks like a lag" in f.text for f in findings)
 
 
-@pytest.mark.parametrize(("column", "factor"), [("time_s", 1e3), ("stress_Pa", 1e-3)])
-def test_another_unit_in_one_run_is_doubted_beside_the_others(folder, column, factor):
-    made = [start_up(rate) for rate in (0.2, 0.5, 1.0, 5.0)]
-    for one in made:
-        del one["N1_Pa"]
-    made[2][column] = factor * made[2][column]
-    units = [f.file for f in check_folder(folder(*made, sweep=False)) if f.subject == "units"]
-    assert units == ["r2.csv"]
-
-
 @pytest.mark.parametrize(
     ("column", "factor", "told"),
     [

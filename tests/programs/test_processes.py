@@ -73,11 +73,11 @@ def test_a_limit_that_cannot_be_read_is_none(limit, text):
 
 @pytest.fixture
 def with_threads(monkeypatch):
-    monkeypatch.setattr(threads, "ThreadPoolExecutor", ThreadPoolExecutor)
-    monkeypatch.setattr(threads, "_WORKERS", 2)
-    threads._pool.cache_clear()
+    monkeypatch.setattr(compiler, "ThreadPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr(compiler, "_WORKERS", 2)
+    compiler._pool.cache_clear()
     yield
-    threads._pool.cache_clear()
+    compiler._pool.cache_clear()
 
 
 @pytest.mark.usefixtures("with_threads")

@@ -83,7 +83,6 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
         findings += start_up.doubts_of_start(run, sweep, spectrum)
         findings += start_up.doubts_of_normal_stress(run, sweep, spectrum)
     findings += linear_theory.against_linear_theory(transients, sweep, spectrum)
-    findings += run_checks.doubts_among_runs(transients)
     if clock_factor is None and not _shift_columns(index):
         findings += run_checks.doubts_of_temperature(runs)
     findings += _of_tables(read)

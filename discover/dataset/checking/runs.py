@@ -13,7 +13,6 @@ from jaxtyping import Float
 
 from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, without_spikes
 from discover.dataset.run import Run
-from discover.protocols.kinematics import KINDS
 from discover.statistics.noise.noise_model import read_times
 from discover.summary_view import NotebookView
 from discover.words import counted
@@ -25,9 +24,6 @@ _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
 _NEIGHBOURHOOD = 31
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
-# Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
-# band) stays within this factor
-_UNIT_FACTOR = 30.0
 # In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11): within the gain of most records
 _ONE_TEMPERATURE = 2.0
 _EQUAL = 1e-9  # range over the largest, up to which all values are one
@@ -195,29 +191,6 @@ def steady_stress(run: Run) -> float | None:
     return level if len(tail) >= 3 and np.ptp(tail) < 0.1 * level else None
 
 
-def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
-    """Yield which start-ups do not go together with the others.
-
-    In a faster start-up the largest stress is no smaller, and larger by the ratio of the rates at
-    most; half of it is reached no later, and earlier by that ratio at most. Thickening and yielding
-    break these rules by less than another unit does.
-    """
-    for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
-        alike = [r for r in runs if r.flow == kind and r.from_rest and is_start_up(r)]
-        if len(alike) < 2:
-            continue
-        rates = np.array([abs(run.rate[0]) for run in alike])
-        for what, quantity, rises in (
-            ("The stress", lambda run: np.max(np.abs(run.stress)), True),
-            ("The time at which the stress rises", _half_time, False),
-        ):
-            values = np.array([quantity(run) for run in alike])
-            for run, ratio in zip(alike, _least_outside(values, rates, rises), strict=True):
-                if abs(np.log(ratio)) >= np.log(_UNIT_FACTOR):
-                    size, factor = "large" if ratio > 1.0 else "small", max(ratio, 1.0 / ratio)
-                    yield found("unlike_others", run.name, what=what, factor=factor, size=size)
-
-
 def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
     """Doubts about runs at several temperatures whose times nobody shifted to one."""
     told = {run.name: run.metadata.get("temperature_C") for run in runs}
@@ -226,22 +199,3 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         cold, hot = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
         names: dict[str, Any] = {"cold": cold, "hot": hot}
         yield found("two_temperatures", **names, lowest=known[cold], highest=known[hot])
-
-
-def _half_time(run: Run) -> float:
-    stress = np.abs(run.stress)
-    return float(run.time[int(np.argmax(stress >= 0.5 * np.max(stress)))])
-
-
-def _least_outside(values: Values, rates: Values, rises: bool) -> Values:
-    """Return by which factor a run is outside what the one that it fits best allows; 1 inside."""
-    factors = np.ones(len(values))
-    if not np.all(values > 0.0):
-        return factors
-    for i in range(len(values)):
-        reference, share = np.delete(values, i), rates[i] / np.delete(rates, i)
-        bound = reference * (share if rises else 1.0 / share)
-        low, high = np.minimum(reference, bound), np.maximum(reference, bound)
-        ratios = values[i] / np.clip(values[i], low, high)
-        factors[i] = ratios[np.argmin(np.abs(np.log(ratios)))]
-    return factors

@@ -9,7 +9,6 @@ import unicodedata
 from functools import cache
 from importlib.resources import files
 from itertools import pairwise
-from typing import Any
 
 # tables of names.toml that name one quantity, the better first
 _PARTS = {"time": ("step_time", "time"), "omega": ("omega", "frequency")}
@@ -30,14 +29,12 @@ _DOTTED = re.compile(
 )
 _DOTTED_EPSILON = re.compile(rf"[εe]{_DOT}|(?<![^\W\d_])(?:epsilon|eps|ε|e)[\s_-]*(?:dot\b|[·•∙⋅])")
 _DOT_BEFORE = re.compile(r"\bdot\W*(gamma|γ|epsilon|ε)")
-_WORD = re.compile(rf"(?:[^\W_]|[{_DOT}'*+])+\.?")
+_WORD = re.compile(rf"(?:[^\W_]|[{_DOT}'*+])+")
 _SPELLED = re.compile(rf"({'|'.join(_GREEK)})([0-9'*+]*)")
-_LONG = " " * 1000
-_SHORTEST = 3  # letters that a word cut short without a dot has at least
 
 
 def words_of(name: str) -> tuple[str, ...]:
-    """Return the words of a name as they are compared; one cut short by a dot keeps the dot."""
+    """Return the words of a name as they are compared."""
     text = unicodedata.normalize("NFKC", name.translate(_PRIMES))
     text = re.sub(rf"\s+{_DOT}", _DOT, text)
     apart = "".join(a + " " * _is_border(a, b) for a, b in pairwise(f"{text} "))
@@ -49,9 +46,7 @@ def words_of(name: str) -> tuple[str, ...]:
     text = text.replace("ẏ", f"γ{_DOT}").replace("ė", f"ε{_DOT}")
     text = _DOTTED_EPSILON.sub(f"ε{_DOT}", _DOTTED.sub(f"γ{_DOT}", text))
     return tuple(
-        _SPELLED.sub(lambda m: _GREEK[m[1]] + m[2], word)
-        if _SPELLED.fullmatch(word.rstrip("."))
-        else word
+        _SPELLED.sub(lambda m: _GREEK[m[1]] + m[2], word) if _SPELLED.fullmatch(word) else word
         for word in (w.lstrip("'") for w in _WORD.findall(text))
         if word
     )
@@ -65,21 +60,18 @@ def _is_border(a: str, b: str) -> bool:
 
 def plain(name: str) -> str:
     """Return a name as it is compared, in one word."""
-    return "".join(word.rstrip(".") for word in words_of(name))
+    return "".join(words_of(name))
 
 
 @cache
-def _places() -> tuple[dict[str, dict[str, int]], dict[tuple[int, str], list[Any]]]:
-    """Return the place of each plain name in its table; tables and words by number and initial."""
+def _places() -> dict[str, dict[str, int]]:
+    """Return the place of each plain name in its table."""
     places: dict[str, dict[str, int]] = {}
-    words_like: dict[tuple[int, str], list[Any]] = {}
     for section, names in shipped_names().items():
         ranks = places.setdefault(section, {})
         for one in (one for name in names for one in (name, name.translate(_UMLAUTS))):
-            words = tuple(word.rstrip(".") for word in words_of(one))
-            ranks.setdefault("".join(words), len(ranks))
-            words_like.setdefault((len(words), words[0][0]), []).append((section, words))
-    return places, words_like
+            ranks.setdefault(plain(one), len(ranks))
+    return places
 
 
 def rank_of(key: str, name: str) -> int | None:
@@ -88,42 +80,26 @@ def rank_of(key: str, name: str) -> int | None:
     for section in _PARTS.get(key, (key,)):
         if section in ranks:
             return before + ranks[section]
-        before += len(_places()[0].get(section, ()))
+        before += len(_places().get(section, ()))
     return None
 
 
 @cache
 def tables_of(name: str) -> dict[str, int]:
     """Return the tables in which a name stands, and its place there."""
-    (places, words_like), words = _places(), words_of(name)
-    bare = [word.rstrip(".") for word in words]
+    words = words_of(name)
 
-    def exact(parts: list[str]) -> dict[str, int]:
-        plain = "".join(parts)
-        return {key: ranks[plain] for key, ranks in places.items() if plain in ranks}
+    def exact(parts: tuple[str, ...]) -> dict[str, int]:
+        whole = "".join(parts)
+        return {key: ranks[whole] for key, ranks in _places().items() if whole in ranks}
 
-    if known := exact(bare):
+    if known := exact(words):
         return known
-    for i in range(1, len(bare)):  # a name and its symbol
-        first, second = exact(bare[:i]), exact(bare[i:])
+    for i in range(1, len(words)):  # a name and its symbol
+        first, second = exact(words[:i]), exact(words[i:])
         if both := {key: min(first[key], second[key]) for key in first if key in second}:
             return both
-    cut: dict[str, str] = {}
-    # a word alone is no shorter form of a compound: Interval is not Intervallzeit
-    alone = not words or (len(words) == 1 and not words[0].endswith("."))
-    for section, whole in () if alone else words_like.get((len(words), words[0][0]), ()):
-        if all(map(_stands_for, words, whole)):
-            cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
-    least = min(map(len, cut.values()), default=0)
-    best = {key: places[key][plain] for key, plain in cut.items() if len(plain) == least}
-    return best if len(best) == 1 else {}  # Shear str. may be either
-
-
-def _stands_for(word: str, whole: str) -> bool:
-    """Return whether a word is another, perhaps cut short: ``mod.`` is modulus."""
-    if word.endswith("."):
-        return whole.startswith(word[:-1])
-    return word == whole or (len(word) >= _SHORTEST and word.isalpha() and whole.startswith(word))
+    return {}
 
 
 @cache

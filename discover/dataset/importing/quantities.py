@@ -1,11 +1,8 @@
-"""Which column is what, and how its unit becomes SI: said, told by the numbers, or asked for."""
+"""Which column is what, and how its unit becomes SI: said, assumed, or asked for."""
 
 import re
-from collections.abc import Callable, Mapping
-from typing import Any, Literal, NamedTuple
-
-import numpy as np
-from jaxtyping import Float
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from discover.dataset.importing.names import plain, rank_of, tables_of
 from discover.dataset.importing.text_export import Block
@@ -16,9 +13,6 @@ from discover.dataset.tables.table import shown
 from discover.dataset.tables.units import Quantity
 from discover.errors import InputError
 from discover.words import listed
-
-Values = Float[np.ndarray, " n"]
-Get = Callable[[str], Values | None]
 
 _QUANTITIES: dict[str, Quantity | str] = {
     "time": units.TIME, "shear_rate": units.SHEAR_RATE, "stress": units.SHEAR_STRESS,
@@ -169,7 +163,6 @@ _CHOICES = {
     **dict.fromkeys(("radius", "diameter", "gap"), ("mm", "m")),
     "omega": ("Hz", "rad/s"), "torque": ("mN*m", "N*m"), "angular_velocity": ("1/min", "rad/s"),
 }  # fmt: skip
-_SHARE = 0.05  # error of a ratio of columns up to which it is that of two units, which differ by 6
 
 
 class UnsaidUnit(NamedTuple):
@@ -177,66 +170,15 @@ class UnsaidUnit(NamedTuple):
 
     column: str
     unit: str  # stands in for it until it is said
-    how: Literal["told", "assumed", "asked"]  # by the numbers, as nothing else is usual, or not
-    why: str = ""  # what tells it
+    asked: bool  # whether the user has to say it, as another is as usual
 
 
-def unsaid_unit(key: str, column: str, raw: Values, get: Get) -> UnsaidUnit:
-    """Return the unit of a column without one; `get` gives other columns in SI units, or None."""
+def unsaid_unit(key: str, column: str) -> UnsaidUnit:
+    """Return the unit of a column without one."""
     choices = _CHOICES.get(key)
     if choices is None or (key == "omega" and "frequency" not in tables_of(column)):
-        return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")
-    if (told := _told(key, raw, get)) is not None:
-        return UnsaidUnit(column, told[0], "told", told[1])
-    return UnsaidUnit(column, choices[-1], "asked")
-
-
-def _told(key: str, raw: Values, get: Get) -> tuple[str, str] | None:
-    """Return the unit that other columns leave as the only one, and how they do."""
-    if key == "phase_angle":
-        # between 0 and a right angle, with some noise beyond
-        far = np.any(np.abs(raw) > 1.05 * np.pi / 2.0)
-        return ("deg", "no angle of loss is that many radians") if far else None
-    size, storage, loss = get("complex_modulus"), get("Gp"), get("Gpp")
-    if size is None and storage is not None and loss is not None:
-        size = np.hypot(storage, loss)
-    if key == "omega":
-        viscosity = get("complex_viscosity")
-        if size is None or viscosity is None:
-            return None
-        factors = {"rad/s": 1.0, "Hz": 2.0 * np.pi}
-        return _of_ratio(size / viscosity, raw, factors, "|G*| is |η*| times it")
-    if not key.startswith("strain"):
-        return None
-    factors = {"1": 1.0, "%": 0.01}
-    stress = next((s for k in ("stress_amplitude", "stress") if (s := get(k)) is not None), None)
-    time, rate = get("time"), get("shear_rate")
-    if stress is not None:
-        modulus, compliance = get("relaxation_modulus"), get("compliance")
-        ways = [(size, "the stress is |G*| times it"), (modulus, "the stress is G(t) times it")]
-        made = [(stress / g, why) for g, why in ways if g is not None]
-        if compliance is not None:
-            made.append((stress * compliance, "it is J(t) times the stress"))
-        told = (_of_ratio(values, raw, factors, why) for values, why in made)
-        if (first := next(filter(None, told), None)) is not None:
-            return first
-    if time is not None and rate is not None and len(time) > 2:
-        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
-        return _of_ratio(steps, np.diff(raw), factors, "it grows as the rate says")
-    return None
-
-
-def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
-    """Return the unit whose factor turns a column into what others make of it, in most rows."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = made / raw
-    ratio = ratio[np.isfinite(ratio)]
-    if len(ratio) < 3:
-        return None
-    # the middle alone is taken: a start, a rest and noise leave single rows far off
-    middle = np.percentile(ratio, [30.0, 50.0, 70.0])
-    near = (u for u, f in factors.items() if np.all(np.abs(middle / f - 1.0) < _SHARE))
-    return next(((unit, why) for unit in near), None)
+        return UnsaidUnit(column, QUANTITIES[key].unit or "1", asked=False)
+    return UnsaidUnit(column, choices[-1], asked=True)
 
 
 UnsaidUnits = dict[tuple[str, str], tuple[str, UnsaidUnit]]
@@ -245,7 +187,7 @@ UnsaidUnits = dict[tuple[str, str], tuple[str, UnsaidUnit]]
 
 def require_units(found: UnsaidUnits) -> None:
     """Raise InputError if there are units that only the user knows; asks for all of them."""
-    asked = {key: pair for (key, _), pair in found.items() if pair[1].how == "asked"}
+    asked = {key: pair for (key, _), pair in found.items() if pair[1].asked}
     if asked:
         options = "; ".join(
             f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
@@ -254,15 +196,12 @@ def require_units(found: UnsaidUnits) -> None:
         files = listed(list(dict.fromkeys(file for file, _ in asked.values())))
         what = "a unit" if len(asked) == 1 else "the units"
         names = listed([shown(one.column) for _, one in asked.values()])
-        raise InputError(
-            f"{files} does not give {what} of {names}, and the numbers do not tell. "
-            f"Say which: {options}."
-        )
+        raise InputError(f"{files} does not give {what} of {names}. Say which: {options}.")
 
 
 def units_taken_as_si(found: UnsaidUnits) -> list[str]:
     """Return the sentence on what is taken as SI, if anything is."""
-    assumed = [(*pair, key) for (key, _), pair in found.items() if pair[1].how == "assumed"]
+    assumed = [(*pair, key) for (key, _), pair in found.items() if not pair[1].asked]
     if not any(QUANTITIES[key].unit for *_, key in assumed):
         return []
     files = listed(list(dict.fromkeys(file for file, *_ in assumed)))

@@ -156,16 +156,13 @@ class Readings:
 
     def _column(self, key: str) -> Values:
         """Return a column in SI units, which from then on counts as used."""
-        read = self._read(key)
+        if key not in self._known:
+            self._known[key] = self._in_si(key)
+        read = self._known[key]
         self.used[key] = read.words
         if read.unsaid is not None:
             self.unsaid[key] = read.unsaid
         return read.values
-
-    def _read(self, key: str) -> _Column:
-        if key not in self._known:
-            self._known[key] = self._in_si(key)
-        return self._known[key]
 
     def _in_si(self, key: str) -> _Column:
         at = self.columns[key]
@@ -191,23 +188,17 @@ class Readings:
             lines = (c for c in self.block.constants if not c.value)
             unit = next((c.unit for c in lines if rank_of(key, c.name) is not None), "")
         if not unit:
-            unit, unsaid = self._unsaid(key, column, raw)
+            unit, unsaid = self._unsaid(key, column)
         factor = quantities.factor_to_si(key, unit, column, self.name)
         words = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
-        if unsaid is not None and unsaid.how == "told":
-            words += f", since {unsaid.why},"
         return _Column(raw * factor, words + (f" × {factor:.6g}" if factor != 1.0 else ""), unsaid)
 
-    def _unsaid(self, key: str, column: str, raw: Values) -> tuple[str, UnsaidUnit | None]:
+    def _unsaid(self, key: str, column: str) -> tuple[str, UnsaidUnit | None]:
         """Return the unit in which a column without one is read, and what is to be said of it."""
         own = {one.column for one in QUANTITIES.values() if one.unit}
         if column == QUANTITIES[key].column and own & {name for name, _ in self.block.columns}:
             return "1", None  # a table of this project's own
-        # what tells a unit is not thereby part of the test
-        others = self.columns.keys() - {key}
-        found = quantities.unsaid_unit(
-            key, column, raw, lambda k: self._read(k).values if k in others else None
-        )
+        found = quantities.unsaid_unit(key, column)
         return found.unit, found
 
     def _made(self, key: str) -> Values | None:
@@ -253,7 +244,7 @@ class Readings:
                 "be. Correct that line."
             )
         if not (unit := self._unit_given(key) or found.unit):
-            unit, unsaid = self._unsaid(key, found.name, np.array([value]))
+            unit, unsaid = self._unsaid(key, found.name)
             if unsaid is not None:
                 self.unsaid[key] = unsaid
         self.used[key] = f"{name} {found.value} {shown(unit)} of the header"

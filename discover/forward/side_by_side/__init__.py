@@ -2,7 +2,7 @@
 
 from discover.forward.side_by_side.code import code_of
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.periodic import PeriodicCode, PeriodicSideBySide
+from discover.forward.side_by_side.periodic import PeriodicSideBySide
 from discover.forward.side_by_side.predictors import Asked, MadeOnce
 from discover.forward.side_by_side.steady import SteadyCode, SteadySideBySide
 from discover.forward.side_by_side.stress import StressCode, StressSideBySide
@@ -12,7 +12,6 @@ __all__ = [
     "Asked",
     "Kernel",
     "MadeOnce",
-    "PeriodicCode",
     "PeriodicSideBySide",
     "SideBySide",
     "SteadyCode",

@@ -260,7 +260,6 @@ def code_of(
     fluid: AugmentedFluid,
     numbers: Numbers,
     flow: Kinematics | None,
-    **choices: bool,
 ) -> _Kind:
     """Return the machine code of a kind for a fluid, made once for all whose constants differ."""
     theta = jax.ShapeDtypeStruct((fluid.size,), float)
@@ -271,11 +270,10 @@ def code_of(
         for tree, axes in zip(found, (1, 0), strict=True)
         for leaf in jax.tree.leaves(tree)
     ]
-    chosen = sorted(choices.items())
-    key = (kind, structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow), *chosen)
+    key = (kind, structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow))
     made = _MADE.get(key)
     if not isinstance(made, kind):
-        made = kind(AugmentedFluid(structure), found, flow, **choices)
+        made = kind(AugmentedFluid(structure), found, flow)
         _MADE[key] = made
         for earliest in list(_MADE)[:-_KEPT]:
             del _MADE[earliest]

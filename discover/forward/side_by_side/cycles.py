@@ -1,6 +1,6 @@
 """The state in which a run begins whose oscillation had gone on for ever, for lanes.
 
-Solved for as in `periodic_states.periodic_start`, by differences: a cycle is followed from the
+Solved for as in `steady_states.periodic_start`, by differences: a cycle is followed from the
 approximation, and from each component of all modes and each state moved a little. All passes,
 and the run itself, share the code of one step.
 """
@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.forward.periodic_states import MOST, TOLERANCE
 from discover.forward.steady_states import (
     FROM_REST,
+    MOST,
+    TOLERANCE,
     Approximation,
     goes_on,
     next_approximation,

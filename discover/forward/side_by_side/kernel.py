@@ -14,7 +14,7 @@ from discover.forward.side_by_side.code import as_array as _array
 from discover.forward.side_by_side.cycles import Cycles
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.programs.lanes import LANES
-from discover.programs.lanes.arithmetic import INTEGER, TRUTH
+from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
 _COUNTS = ("runs", "steps", "modes", "tabled", "normal")
@@ -42,31 +42,23 @@ class Kernel(Code):
     """Machine code for flows at a given rate in time.
 
     A step is followed in pieces of one length, until all eight vectors are steady. `steps_taken`:
-    pieces that eight vectors took at once, in all calls so far. `cycles`: whether some runs begin
-    with a periodic state.
+    pieces that eight vectors took at once, in all calls so far.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
 
-    def __init__(
-        self,
-        fluid: AugmentedFluid,
-        found: tuple[Mode, Shared],
-        flow: Kinematics | None,
-        cycles: bool,
-    ):
+    def __init__(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None):
         super().__init__(fluid, found, flow)
-        self._begins, self.steps_taken = cycles, 0
+        self.steps_taken = 0
         self._times_at = self.flags.names.index("times")
         self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._make(fluid, found, flow, cycles)
+        self._make(fluid, found, flow)
 
     def __call__(
         self,
-        runs: int,
         tabled: int,
         used: np.ndarray,
         given: dict[str, np.ndarray],
@@ -78,8 +70,8 @@ class Kernel(Code):
         and their structure variables, (runs, ends, s, lanes), empty unless `normal`. `tabled`:
         modes whose weights stand in the table. `used`: parts that a vector needs; see `Flags`.
         """
-        steps, modes = given["width"].shape[1], len(given["mode"])
-        stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
+        (runs, steps), modes = given["width"].shape, len(given["mode"])
+        stress = np.full((runs, steps + 1, LANES), np.nan)
         felt, taken = np.zeros_like(stress), np.zeros(1, np.int64)
         of_modes = np.full((*stress.shape[:2], self.size if normal else 0, LANES), np.nan)
         of_modes[:, 0] = 0.0
@@ -88,7 +80,7 @@ class Kernel(Code):
         size = self._state_at + modes * self.size
         # the state stands there twice: as it was before a piece, too
         room = _STATE + 2 * (size - _STATE)
-        room += Cycles.room(self._state_at - _LEVELS, modes, self.size) * self._begins
+        room += Cycles.room(self._state_at - _LEVELS, modes, self.size)
         scratch = np.empty((room, LANES))
         arrays = given | {
             "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "taken": taken,
@@ -105,9 +97,8 @@ class Kernel(Code):
         self._on = self._truths()
         self._moves = w.builder.alloca(INTEGER)
         self._numbers = w.at((w.counts["modes"], self.size), (self._state_at - _STATE, 1))
-        if self._begins:
-            room, has_states = w.at((self._numbers, 2), (_STATE, 1)), self._on["states"]
-            self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
+        room, has_states = w.at((self._numbers, 2), (_STATE, 1)), self._on["states"]
+        self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
         with w.loop(w.counts["runs"]) as run, self._arithmetic.apart():
             self._of_run(run)
 
@@ -126,24 +117,19 @@ class Kernel(Code):
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
         last = w.load("last", run)
-        if self._begins:
-            cycle = [w.load("cycle", w.at((run, 2), (i, 1))) for i in range(2)]
-            period = self._splat("period", run)
-            start, end = cycle
-            passes = self._cycles.passes(start, end, last, period, lambda: self._settle(flow))
-            with passes as (first, behind, is_run), self._arithmetic.apart():
-                self._steps(run, first, w.builder.sub(behind, first), flow, is_run)
-        else:
-            self._steps(run, INTEGER(0), last, flow, TRUTH(1))
+        start, end = (w.load("cycle", w.at((run, 2), (i, 1))) for i in range(2))
+        period = self._splat("period", run)
+        passes = self._cycles.passes(start, end, last, period, lambda: self._settle(flow))
+        with (
+            passes as (first, behind, is_run),
+            self._arithmetic.apart(),
+            w.loop(w.builder.sub(behind, first)) as number,
+            self._arithmetic.apart(),
+        ):
+            self._of_interval(run, w.at((number, 1), (first, 1)), flow, is_run)
         self._at_start(run, flow)
         with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
             self._beside(run, number, flow)
-
-    def _steps(self, run, first, count, flow, is_run) -> None:
-        """Write so many steps, and what is recorded in them if they are the run's."""
-        w, arithmetic = self._w, self._arithmetic
-        with w.loop(count) as number, arithmetic.apart():
-            self._of_interval(run, w.at((number, 1), (first, 1)), flow, is_run)
 
     def _settle(self, flow) -> None:
         """Write what a step needs of modes that were not reached by a step before."""

@@ -21,15 +21,14 @@ class Asked(NamedTuple):
     """What is asked of vectors of parameters.
 
     `moduli`: of the declared modes in Pa, the solvent's viscosity in Pa s last. `part`: runs of one
-    control. `runs`: how many are no padding. `whole`: whether behind what is recorded the stress
-    without what distorts a signal is asked for, and the components of the modes.
+    control. `whole`: whether behind what is recorded the stress without what distorts a signal is
+    asked for, and the components of the modes.
     """
 
     numbers: Numbers
     thetas: Float[np.ndarray, "trials p"]
     moduli: Float[np.ndarray, "trials c"]
     part: Any
-    runs: int
     whole: bool
 
     @property
@@ -140,26 +139,3 @@ class StatePredictor(LanePredictor):
             present = self._fluid.present(asked.thetas)
             found = self._rates(per_run(asked.thetas), present, commanded, flow)
         return np.broadcast_to(found, (len(asked.thetas), *commanded.shape))
-
-    def _by_states(
-        self,
-        thetas: Float[np.ndarray, "trials p"],
-        alike: Sequence[Int[np.ndarray, " _"]],
-        eights_at_once: int,
-        solve: Callable[[np.ndarray, np.ndarray, np.ndarray], None],
-    ) -> None:
-        """Solve for states of vectors, those together that need the same parts of the code.
-
-        `alike`: groups of states that may stand side by side. `solve`: of the parts needed, and of
-        each lane its vector and state.
-        """
-        patterns, which = np.unique(self._flags.of(thetas), axis=0, return_inverse=True)
-        size, pieces = eights_at_once * LANES, []
-        for number, pattern in enumerate(patterns):
-            trials = np.flatnonzero(which.ravel() == number)
-            for states in alike:
-                trial, state = np.repeat(trials, len(states)), np.tile(states, len(trials))
-                for first in range(0, len(trial), size):
-                    some = first + in_whole_eights(min(size, len(trial) - first))
-                    pieces.append((pattern, trial[some], state[some]))
-        in_threads(lambda piece: solve(*piece), pieces, is_compiled=True)

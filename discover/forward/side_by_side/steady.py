@@ -1,6 +1,6 @@
 """Flow curves of many vectors of parameters: every steady state is a lane of its own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import equinox as eqx
 import jax
@@ -16,6 +16,7 @@ from discover.forward.side_by_side.predictors import (
     Asked,
     StatePredictor,
     flows_of,
+    in_whole_eights,
     per_run,
 )
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
@@ -27,6 +28,7 @@ from discover.forward.steady_states import (
     arrived,
     moves,
 )
+from discover.programs import in_threads
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
@@ -258,7 +260,8 @@ class SteadySideBySide(StatePredictor):
         flows = flows_of(part.kinematics)
         out = np.empty((len(rate), *own.shape, 2 + self._code.size))
 
-        def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
+        def solve(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+            used, trial, state = piece
             row, column = of_run[state], at[state]
             given = packed.of_lanes(trial, asked.declared) | {
                 "rate": lanes_last(rate[trial, row, column]),
@@ -268,5 +271,18 @@ class SteadySideBySide(StatePredictor):
             found = np.concatenate([stress[:, None], felt[:, None], of_modes], axis=1)
             out[trial, row, column] = np.moveaxis(found, 1, -1).reshape(-1, out.shape[-1])
 
-        self._by_states(asked.thetas, [np.arange(len(of_run))], _AT_ONCE, solve)
+        in_threads(solve, self._pieces(asked.thetas, len(of_run)), is_compiled=True)
         return np.take_along_axis(out, place[None, :, :, None], axis=2)
+
+    def _pieces(
+        self, thetas: Float[np.ndarray, "trials p"], states: int
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Yield vectors and states of lanes, and the parts of the code that those need alike."""
+        patterns, which = np.unique(self._flags.of(thetas), axis=0, return_inverse=True)
+        size = _AT_ONCE * LANES
+        for number, pattern in enumerate(patterns):
+            trials = np.flatnonzero(which.ravel() == number)
+            trial, state = np.repeat(trials, states), np.tile(np.arange(states), len(trials))
+            for first in range(0, len(trial), size):
+                some = first + in_whole_eights(min(size, len(trial) - first))
+                yield pattern, trial[some], state[some]

@@ -97,7 +97,7 @@ class SideBySide(LanePredictor):
         self._known_table: tuple | None = None
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded of the runs that are no padding; see `Asked.whole`."""
+        """Return what is recorded, see `Asked.whole`."""
         times, counts = np.unique(asked.thetas[:, 1], return_counts=True)
         most = int(np.argmax(counts))
         table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
@@ -118,7 +118,7 @@ class SideBySide(LanePredictor):
         packed: dict[str, np.ndarray],
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
-        thetas, runs, declared = asked.thetas, asked.runs, asked.declared
+        thetas, declared = asked.thetas, asked.declared
         flows, given, in_shear = laid_out
         given, tool_rate = given | packed, flows.commanded_rate[:, ::2]
         columns, present = per_run(thetas), self._fluid.present(thetas)
@@ -129,8 +129,8 @@ class SideBySide(LanePredictor):
         time, given["table"] = table
         if given["table"] is None or np.any(thetas[:, 1] != time):
             given["table"], declared = np.zeros(WEIGHTS), 0
-        stress, felt, of_modes = self._code(runs, declared, used, given, asked.whole)
-        places = np.arange(runs)[:, None], flows.sample_index[:runs]
+        stress, felt, of_modes = self._code(declared, used, given, asked.whole)
+        places = np.arange(len(stress))[:, None], flows.sample_index
         at_samples, beside = stress[places], []
         if asked.whole:
             own = (at_samples[:, :, None], of_modes[places])
@@ -139,10 +139,9 @@ class SideBySide(LanePredictor):
             return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
         beyond = np.arange(stress.shape[1]) > given["last"][:, None]
         felt[beyond], stress[beyond] = given["rate"][:, ::2][beyond], 0.0
-        flows = jax.tree.map(lambda leaf: leaf[:runs], flows)
-        signals = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
+        signals = (np.moveaxis(of, -1, 0) for of in (stress, felt))
         with np.errstate(all="ignore"):  # of a vector that runs away
-            found = self._distorted(columns, present, flows, *signals, tool_rate[..., :runs, :])
+            found = self._distorted(columns, present, flows, *signals, tool_rate)
         return np.concatenate([found[:, *places][..., None], *beside], axis=-1)
 
     def _table(

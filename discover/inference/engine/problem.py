@@ -9,9 +9,8 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.effects import AbstractEffect, EffectParameter, make_effect
 from discover.effects.library_term import LibraryTerm
-from discover.forward import AugmentedModel, DeclaredModel
+from discover.forward import AugmentedModel, DeclaredModel, data_scales
 from discover.forward.declared import LARGEST
-from discover.forward.scales import data_scales
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import TORQUE, Rows, transducer_of
 from discover.inference.engine.variables import SLIP_CURVE

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import llvmlite.ir as ir
 import numpy as np
 
+from discover.programs.compiler import on_device
 from discover.programs.lanes.arithmetic import DOUBLES, Arithmetic, NotTranslatable, Value
-from discover.programs.threads import on_device
 
 Values = np.ndarray
 """An array of values."""

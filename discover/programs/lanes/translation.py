@@ -15,6 +15,7 @@ import llvmlite.ir as ir
 import numpy as np
 from jax.extend.core import jaxpr_as_fun
 
+from discover.programs.compiler import on_device
 from discover.programs.lanes.arithmetic import (
     DOUBLES,
     INTEGER,
@@ -36,7 +37,6 @@ from discover.programs.lanes.primitives import (
     known_as,
     moved,
 )
-from discover.programs.threads import on_device
 
 _LOGGER = logging.getLogger(__name__)
 

@@ -1,18 +1,16 @@
-"""Runs laid out in a shared shape: each is predicted as in its own, and no run touches another."""
+"""Runs of one batch, padded to one length: each is predicted as by itself."""
 
 import numpy as np
-import pytest
 from vectors import vector_of
 
 from discover.dataset import Run
 from discover.effects import make_effect
-from discover.forward import AugmentedModel, DeclaredModel, TransientFlows, make_batch
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.loop.measured_rates import with_places, with_rate_steps
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 
 MODULI, TIMES = np.array([50.0, 120.0, 30.0, 10.0]), np.array([3.0, 0.5, 0.05, 0.01])
 DECLARED = DeclaredModel.maxwell(MODULI, TIMES)
-IN_SOLVENT = DeclaredModel.maxwell(MODULI, TIMES, solvent_viscosity=5.0)
 AMPLITUDES = {"giesekus_mobility": 0.3, "instrument_inertia": 2.0, "tool_compliance": 1e-4}
 
 
@@ -26,23 +24,6 @@ MANY = [
     record("slow", start_up(0.5), 8.0, 60),
     record("turned", oscillatory_shear(3.0, 1.2), 8.0, 50),
 ]
-FEW = [record("short", start_up(2.0), 1.0, 12)]
-
-
-def model_of():
-    model = AugmentedModel(IN_SOLVENT, [*map(make_effect, AMPLITUDES)])
-    return model, vector_of(model, **AMPLITUDES)
-
-
-@pytest.mark.parametrize("runs", [FEW, MANY + FEW + MANY[:1]])
-def test_runs_in_a_shared_shape_are_predicted_as_in_their_own(runs, monkeypatch):
-    model, theta = model_of()
-    found = model.predict(theta, make_batch(runs))
-    monkeypatch.setattr(TransientFlows, "in_shared_shape", lambda flows: flows)
-    expected = model.predict(theta, make_batch(runs))
-    assert found.shape == expected.shape
-    # the same steps; sums of modes may be taken in another order
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(expected))
 
 
 def test_a_rate_that_steps_between_samples_still_steps_there():
