@@ -107,10 +107,10 @@ class Learning:
             result, fluid = train(
                 learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
             )
-        predictions, seen = simulated(fluid, flows)
+        predictions = simulated(fluid, flows)
         outcome = LearnerOutcome(
             result.learner, result.terms, result.train_seconds, result.details, result.message,
-            predictions, physics_of(seen, flows),
+            predictions, physics_of(fluid, flows),
             bands_of_members(result, fluid, flows, predictions), self._left(fluid, frame),
         )  # fmt: skip
         if store is not None:

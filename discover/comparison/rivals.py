@@ -6,8 +6,9 @@ from typing import Any
 
 from discover import identify
 from discover.comparison.bands import flow_run, in_flows
-from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
+from discover.comparison.flows import QUANTITIES, Flow, Stresses, relative_errors
 from discover.comparison.hypotheses import terms_of
+from discover.comparison.outcome import simulated
 from discover.dataset.run import Run
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
@@ -147,7 +148,7 @@ def _simulate(
     whole = LawTerms({**dict.fromkeys(names, 0.0), **terms.coefficients}, terms.inner)
     law = law_of_terms(whole, model.law.linear_relaxation, model.law)
     fluid = Fluid(law, model.modulus, model.relaxation_time, model.solvent_viscosity)
-    return {flow.key: predict(fluid, flow) for flow in flows}
+    return simulated(fluid, flows)
 
 
 def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:

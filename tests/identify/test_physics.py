@@ -3,32 +3,26 @@
 import json
 
 import jax.numpy as jnp
-import numpy as np
 import pytest
 
-from discover.identify.physics import check_physics, see
+from discover.identify.physics import check_physics
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
-from discover.protocols import imposed_stress, in_flow, oscillatory_shear, start_up
 from tensor_library import TermLibrary, parse_term
 
-FLOWS = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}
 FLOW_CURVE = "flow curve monotonic"
 EXTENSION = "steady extension bounded"
-TERMS = ("sigma", "gammadot", "sigma.sigma", "tr(sigma)*sigma")
+TERMS = ("sigma", "sigma.sigma")
 
 
 def expansion(**coefficients):
     """One structure for every library law here, so that they share programs."""
     library = TermLibrary(tuple(parse_term(name) for name in TERMS))
-    values = [coefficients.get(key, 0.0) for key in ("linear", "viscous", "quadratic", "trace")]
+    values = [coefficients.get(key, 0.0) for key in ("linear", "quadratic")]
     return LibraryExpansion(jnp.array(values), jnp.zeros(0), library)
 
 
 def report(law, solvent=0.0):
-    flows = list(FLOWS.values())
-    fluid = Fluid(law, 1.0, 1.0, solvent)
-    seen = see(fluid, flows, [np.linspace(0, 10, 81)] * 2, 2.0, 1.0)
-    return check_physics(seen, dict(enumerate(FLOWS)))
+    return check_physics(Fluid(law, 1.0, 1.0, solvent), 2.0)
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +68,6 @@ def test_enough_solvent_makes_slip_monotonic_and_linear_terms_and_feedback_are_c
     assert changed.value == pytest.approx(0.1 / 1.1, rel=1e-3)
     # h = −1.5 σ: stress grows by itself
     checks = report(expansion(linear=-1.5))
-    # where the conformation tensor loses definiteness the stored energy is not defined
-    names = ("dissipation non-negative", "conformation tensor positive definite")
-    assert False in [checks[name].passed for name in names]
     assert checks[EXTENSION].passed is False
 
 
@@ -85,34 +76,3 @@ def test_giesekus_is_monotonic_up_to_a_mobility_of_one_half(mobility, monotonic)
     checks = report(Giesekus(mobility))
     assert checks[FLOW_CURVE].passed is monotonic
     assert checks[EXTENSION].passed
-
-
-def test_in_extension_the_dissipation_is_that_of_extension():
-    times = np.array([40.0, 50.0])
-    seen = see(Fluid(), [in_flow(start_up(0.2), "uniaxial")], [times], 2.0, 1.0)
-    # A = diag(1/(1 − 2ε̇), 1/(1 + ε̇), 1/(1 + ε̇)), and tr(A + A⁻¹ − 2I)/2 is lost; what is left of
-    # the start is exp(−24), and steps err by 1e-6
-    lost = 0.5 * sum(a + 1.0 / a - 2.0 for a in (1.0 / 0.6, 1.0 / 1.2, 1.0 / 1.2))
-    assert seen.along.dissipation[0] == pytest.approx(lost, rel=1e-5)
-
-
-def test_where_no_rate_is_given_conformations_are_those_of_oscillations_like_in_training():
-    times = np.linspace(0.5, 10.0, 20)
-    creep, start = imposed_stress(times, np.ones(20)), start_up(1.0)
-    seen = see(Fluid(solvent_viscosity=0.1), [creep, start], [times, times], 2.0, 1.0)
-    told = [check_physics(seen, names).checks[0] for names in ({0: "creep"}, {0: "creep", 1: "b"})]
-    assert [one.passed for one in told] == [True, True]
-    assert told[0].where.startswith("oscillation at Wi = 2, ")
-    assert told[1].where == "b"
-
-
-def test_negative_viscosity_does_negative_work_and_a_law_that_runs_away_ends_its_box():
-    # h = 2 γ̇: the elastic response has the wrong sign
-    checks = report(expansion(viscous=2.0))
-    assert checks["work over a cycle non-negative"].passed is False
-    # −0.1 tr(σ)σ thins the relaxation until it turns into growth
-    checks = report(expansion(trace=-0.1))
-    reach = checks["integrates beyond training"]
-    assert reach.passed is False
-    assert 0.0 <= reach.value < 10.0
-    assert "diverges" in reach.text
