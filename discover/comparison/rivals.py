@@ -29,9 +29,6 @@ MOST_RIVALS = 8
 _POSSIBLE = 0.01
 """Probability from which on a hypothesis is a rival."""
 
-FOUND = "the law found"
-"""Name of the chosen law among those at which the structure is analysed."""
-
 
 @dataclass(frozen=True)
 class Rival:
@@ -171,29 +168,3 @@ def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | N
     # among the flows of the comparison if one of them will do
     place = place if separation > SEPARATED else rival.separated_by
     return replace(rival, errors_to_chosen=worst, separated_by=place)
-
-
-def law_structure(structure: identify.Structure | None) -> identify.LawStructure | None:
-    """Return the structure at the law found, or at the known part where that law diverges."""
-    if structure is None or not structure.laws:
-        return None
-    return next((law for law in structure.laws if law.name == FOUND), structure.laws[0])
-
-
-def structure_of(
-    terms: Sequence[LawTerm],
-    runs: Sequence[Run],
-    library: TermLibrary,
-    model: StudyModel,
-    use_normal_stresses: bool,
-    alone: identify.Structure | None = None,
-) -> identify.Structure:
-    """Return what the flows of these runs determine, at the known part and at the law found.
-
-    `alone`: the same at the known part, where that is known.
-    """
-    found = LawTerms.of(terms)
-    nominal = {FOUND: found} if found.coefficients else {}
-    return identify.analyse_structure(
-        runs, library, model.fluid, nominal, use_normal_stresses, alone
-    )

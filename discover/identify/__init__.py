@@ -2,10 +2,10 @@
 
 from discover.identify.physics import check_physics
 from discover.identify.side_by_side import Difference
-from discover.identify.structure import LawStructure, Structure, analyse_structure
+from discover.identify.structure import Structure, analyse_structure
 from discover.identify.twins import HiddenStresses, Twin, find_twins
 
 __all__ = [
-    "Difference", "HiddenStresses", "LawStructure", "Structure", "Twin",
+    "Difference", "HiddenStresses", "Structure", "Twin",
     "analyse_structure", "check_physics", "find_twins",
 ]  # fmt: skip
