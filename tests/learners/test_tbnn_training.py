@@ -82,21 +82,6 @@ def test_the_network_is_called_in_when_constants_leave_structure():
     assert trained.misfit < 0.5 * alone.misfit
 
 
-def test_functions_are_not_tried_where_constants_are_not_gone_on_from():
-    asked = []
-
-    def goes_on(law, misfit):
-        asked.append((law, misfit))
-        return False
-
-    problem = problem_of("ptt_linear", {"epsilon": 0.4})
-    trained = recipes.train_default(problem, jax.random.key(0), True, SMALL, goes_on=goes_on)
-    # asked once, of constants that leave structure: by default a network is called in, as above
-    assert asked == [(trained.law, trained.misfit)]
-    assert not trained.varies
-    assert trained.message.endswith("the residual still has structure")
-
-
 def test_the_same_key_gives_the_same_law(giesekus_problem, trained):
     again = recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
     assert again.misfit == trained.misfit
