@@ -33,7 +33,7 @@ from discover.dataset.run_table import material_and_temperature
 from discover.identify import Structure, analyse_structure
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
-from discover.learners.runs import waiting
+from discover.learners.settings import waiting
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult

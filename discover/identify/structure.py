@@ -34,7 +34,7 @@ from discover.identify.twins import hidden_stresses
 from discover.laws import Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.laws.expansion import expansion_of, law_of_terms
-from discover.learners.runs import as_runs
+from discover.learners.settings import as_runs
 from discover.programs import compiled
 from discover.summary_view import NotebookView, table_of
 from discover.words import counted

@@ -9,7 +9,7 @@ from independent import Giesekus, oscillation
 
 from discover.dataset import Run
 from discover.laws import Fluid
-from discover.learners.runs import as_runs
+from discover.learners.settings import as_runs
 from discover.learners.tbnn_ude.problem import make_problem as training_problem
 from discover.learners.tbnn_ude.session import without_network
 from discover.learners.tensor_sindy import TensorSINDy

@@ -2,21 +2,22 @@
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.forward.flow_batch import FlowBatch
 from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.runs import rough_limits
 from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
@@ -25,6 +26,7 @@ from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingP
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
+from discover.protocols.kinematics import STATES
 from tensor_library import TENSOR_NAMES, TermLibrary, parse_term
 
 RECIPES = ("default", "thorough", "paper")
@@ -216,7 +218,7 @@ def _rougher(
     if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
         problem = make_problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
-    limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
+    limits = _rough_limits(problem.flows, np.asarray(known.relaxation_time))
     if limits is not None and known.law.linear_relaxation:
         rough = make_problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
@@ -224,6 +226,38 @@ def _rougher(
             problem = rough
             said.append(f"it was trained in {share:.2g} times fewer steps than it is tested in")
     return problem, ", and ".join(said)
+
+
+_STRAIN_STEP, _PHASE_STEP, _GROWTH = 0.4, 0.3, 0.1
+
+
+def _rough_limits(
+    flows: FlowBatch, relaxation_time: Float[np.ndarray, " k"]
+) -> Mapping[str, float] | None:
+    """Return limits of longer steps, as `make_grid` takes them; None where the flows have none.
+
+    Steps grow after a change of the rate up to a strain of one, and follow the fastest relaxation
+    where the fine grid does, else the slowest: over steps of many relaxation times a law that
+    relaxes faster than the known one diverges.
+    """
+    controls = {protocols.control for protocols, _ in flows.parts}
+    if not controls <= {"rate", *STATES}:
+        return None
+    if "rate" not in controls:
+        return {"strain_step": _STRAIN_STEP}
+    longest = max(
+        float(np.max(np.diff(grid.times, axis=1)))
+        for protocols, grid in flows.parts
+        if protocols.control == "rate"
+    )
+    times = np.asarray(relaxation_time)
+    followed = float(np.min(times) if longest <= np.min(times) else np.max(times))
+    return {
+        "strain_step": _STRAIN_STEP,
+        "phase_step": _PHASE_STEP,
+        "growth": _GROWTH,
+        "max_step": max(longest, followed),
+    }
 
 
 def _count_of_numbers(law: TensorBasisNetwork, varies: bool) -> int:
