@@ -1,11 +1,14 @@
 """Learners of a comparison, their results kept as they are found."""
 
+import queue
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from threading import Event
+from typing import TypeVar
 
 import numpy as np
 
-from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome, bands_of_members, physics_of, simulated
 from discover.dataset.run import Run
@@ -14,7 +17,7 @@ from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.plain_numbers import plain
-from discover.progress import Progress, silent
+from discover.progress import Progress, Stopped, may_be_stopped, silent
 from discover.study.declared_model import StudyModel
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
@@ -131,3 +134,55 @@ class Learning:
         fluid = replace(fluid, modulus_covariance=frame.model.modulus_covariance)
         loading, computed = study.compare.loading or 0.0, study.data.synthetic is not None
         return lack_of_fit(fluid, runs, study.loop.noise, loading, computed)
+
+
+R = TypeVar("R")
+
+_LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be interrupted
+
+
+def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
+    """Return what each part returns, all computed side by side.
+
+    Progress is passed on in the thread of the caller, with the mean of the fractions. If one part
+    fails, or the caller is interrupted, the others end where they next ask or say something.
+    """
+    if len(parts) < 2:
+        return {
+            name: part(lambda text, fraction, name=name: progress(f"{name}: {text}", fraction))
+            for name, part in parts.items()
+        }
+    told: queue.SimpleQueue[tuple[str, str, float] | Future[R]] = queue.SimpleQueue()
+    stop, fractions = Event(), dict.fromkeys(parts, 0.0)
+
+    def run(name: str, part: Callable[[Progress], R]) -> R:
+        def say(text: str, fraction: float) -> None:
+            if stop.is_set():
+                raise Stopped
+            told.put((name, text, fraction))
+
+        with may_be_stopped(stop):
+            return part(say)
+
+    with ThreadPoolExecutor(len(parts)) as pool:
+        try:
+            futures = {name: pool.submit(run, name, part) for name, part in parts.items()}
+            for future in futures.values():
+                future.add_done_callback(told.put)
+            running = len(futures)
+            while running:
+                try:
+                    one = told.get(timeout=_LOOK_UP)
+                except queue.Empty:
+                    continue
+                if isinstance(one, Future):
+                    one.result()  # or what it failed with
+                    running -= 1
+                    continue
+                name, text, fraction = one
+                fractions[name] = max(fractions[name], fraction)
+                progress(f"{name}: {text}", sum(fractions.values()) / len(fractions))
+        except BaseException:
+            stop.set()
+            raise
+    return {name: future.result() for name, future in futures.items()}

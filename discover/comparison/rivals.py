@@ -5,9 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from discover import identify
-from discover.comparison.bands import flow_run, in_flows
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, relative_errors
-from discover.comparison.hypotheses import terms_of
+from discover.comparison.hypotheses import flow_run, in_flows, terms_of
 from discover.comparison.outcome import simulated
 from discover.dataset.run import Run
 from discover.laws.expansion import law_of_terms

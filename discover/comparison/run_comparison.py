@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from discover.comparison.bands import flow_bands
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import (
@@ -23,7 +22,13 @@ from discover.comparison.flows import (
     with_each_run,
     without_spikes_in_fit,
 )
-from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
+from discover.comparison.hypotheses import (
+    MOST_EFFECTS,
+    flow_bands,
+    search_hypotheses,
+    terms_of,
+    with_proposals,
+)
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, study_library
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart

@@ -13,7 +13,7 @@ from independent.noise import white
 import discover as dc
 from discover.comparison import relative_errors
 from discover.comparison.flows import true_terms
-from discover.comparison.hypotheses import at_once
+from discover.comparison.learning import at_once
 from discover.progress import Stopped, require_wanted, silent
 
 
