@@ -1,10 +1,9 @@
 """Learners of a comparison, their results kept as they are found."""
 
-import queue
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
-from threading import Event
+from threading import Event, Lock
 from typing import TypeVar
 
 import numpy as np
@@ -144,44 +143,35 @@ _LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be in
 def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
     """Return what each part returns, all computed side by side.
 
-    Progress is passed on in the thread of the caller, with the mean of the fractions. If one part
-    fails, or the caller is interrupted, the others end where they next ask or say something.
+    Progress is passed on with the mean of the fractions, of one part at a time. If one part fails,
+    or the caller is interrupted, the others end where they next ask or say something.
     """
     if len(parts) < 2:
         return {
             name: part(lambda text, fraction, name=name: progress(f"{name}: {text}", fraction))
             for name, part in parts.items()
         }
-    told: queue.SimpleQueue[tuple[str, str, float] | Future[R]] = queue.SimpleQueue()
-    stop, fractions = Event(), dict.fromkeys(parts, 0.0)
+    stop, turn, fractions = Event(), Lock(), dict.fromkeys(parts, 0.0)
 
     def run(name: str, part: Callable[[Progress], R]) -> R:
         def say(text: str, fraction: float) -> None:
-            if stop.is_set():
-                raise Stopped
-            told.put((name, text, fraction))
+            with turn:
+                if stop.is_set():
+                    raise Stopped
+                fractions[name] = max(fractions[name], fraction)
+                progress(f"{name}: {text}", sum(fractions.values()) / len(fractions))
 
         with may_be_stopped(stop):
             return part(say)
 
     with ThreadPoolExecutor(len(parts)) as pool:
+        futures = {name: pool.submit(run, name, part) for name, part in parts.items()}
         try:
-            futures = {name: pool.submit(run, name, part) for name, part in parts.items()}
-            for future in futures.values():
-                future.add_done_callback(told.put)
-            running = len(futures)
+            running = set(futures.values())
             while running:
-                try:
-                    one = told.get(timeout=_LOOK_UP)
-                except queue.Empty:
-                    continue
-                if isinstance(one, Future):
+                ended, running = wait(running, _LOOK_UP, FIRST_COMPLETED)
+                for one in ended:
                     one.result()  # or what it failed with
-                    running -= 1
-                    continue
-                name, text, fraction = one
-                fractions[name] = max(fractions[name], fraction)
-                progress(f"{name}: {text}", sum(fractions.values()) / len(fractions))
         except BaseException:
             stop.set()
             raise
