@@ -29,7 +29,7 @@ def verdict_alone(patch: pytest.MonkeyPatch, *, structure: bool = False) -> None
     patch.setattr("discover.loop.from_posterior.spread_of_laws", lambda *_: {})
     patch.setattr("discover.comparison.run_comparison.exact_twins", lambda *_: [])
     if not structure:
-        patch.setattr("discover.comparison.run_comparison.structure_of", lambda *_: None)
+        patch.setattr("discover.comparison.run_comparison.analyse_structure", lambda *_: None)
     patch.setattr("discover.comparison.learning.physics_of", lambda *_: {"checks": []})
 
 

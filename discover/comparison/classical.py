@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.comparison.bands import in_flows
 from discover.comparison.flows import Flow, of_recorded, relative_errors
+from discover.comparison.hypotheses import in_flows
 from discover.comparison.known_part import Frame
 from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
 from discover.forward import DeclaredModel

@@ -15,7 +15,7 @@ from discover.comparison.rivals import Rival
 from discover.comparison.statements import IN_LIBRARY, Statement, outcome_equation
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
-from discover.identify.structure import Structure
+from discover.identify import Structure
 from discover.learners.lack_of_fit import FitVerdict, LackOfFit
 from discover.learners.results import estimates_of
 from discover.loop.loop_result import LoopResult

@@ -19,7 +19,7 @@ from discover.laws import Fluid, make_law
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
-from discover.simulate.solve import SimulationError, observe
+from discover.simulate.solve import observe
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
 from discover.study.declared_model import StudyModel
@@ -273,14 +273,6 @@ def _oscillates(protocol: protocols.FlowProtocol, rates: np.ndarray) -> bool:
 def columns_of(observed: Float[np.ndarray, "n 3"]) -> dict[str, np.ndarray]:
     """Return the compared quantities by name."""
     return dict(zip(QUANTITIES, observed.T, strict=True))
-
-
-def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
-    """Return what a fluid does in a flow, or None if it diverges."""
-    try:
-        return columns_of(observe(fluid, flow.protocol, flow.times))
-    except SimulationError:
-        return None
 
 
 def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[str, float | None]:

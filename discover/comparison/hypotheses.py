@@ -1,22 +1,26 @@
-"""Posterior of a comparison: a search's hypotheses and the learners' proposals, weighed."""
+"""Posterior of a comparison: a search's hypotheses and the learners' proposals, in its flows."""
 
-import queue
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from threading import Event
-from typing import TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
+from discover.comparison.flows import MEASURED, Band, Flow, Stresses, columns_of
+from discover.dataset import Run
 from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, named_effects
 from discover.equations.parts import combined
+from discover.forward import AugmentedModel, make_batch
+from discover.forward.of_fluids import bare_run
+from discover.inference.engine.bands import Predictions
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.posterior import posterior_of
+from discover.inference.engine.rows import Rows
 from discover.learners.results import RecoveredTerm
+from discover.linear_algebra_threads import in_one_thread
+from discover.loop.expected_errors import weighed_laws
 from discover.loop.loop import Found, search
 from discover.loop.task import Say, Task
-from discover.progress import Progress, Stopped, may_be_stopped
 from discover.study.data import StudyData
 from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study
@@ -191,53 +195,68 @@ def terms_named(effects: Iterable[str]) -> set[str]:
     return {terms.get(effect, effect) for effect in effects}
 
 
-R = TypeVar("R")
+@in_one_thread
+def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> dict[str, Band]:
+    """Return the band of each flow, by its key; those in which most hypotheses diverge have none.
 
-_LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be interrupted
-
-
-def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
-    """Return what each part returns, all computed side by side.
-
-    Progress is passed on in the thread of the caller, with the mean of the fractions. If one part
-    fails, or the caller is interrupted, the others end where they next ask or say something.
+    Where no law is all there is, σ12 is that of laws which predict runs left out best, as in a
+    closed loop. These need not come nearest in N1 and N2, for which all count that describe the
+    runs about as well. Runs are predicted as recorded, other flows for the fluid alone. `runs`: as
+    recorded, by name.
     """
-    if len(parts) < 2:
-        return {
-            name: part(lambda text, fraction, name=name: progress(f"{name}: {text}", fraction))
-            for name, part in parts.items()
+    posterior, asked = found.posterior, [flow_run(flow, found, runs) for flow in flows]
+    weighed, out = weighed_laws(posterior), {}
+    for recorded in (True, False):
+        some = [
+            (flow, run)
+            for flow, run in zip(flows, asked, strict=True)
+            if (flow.kind in MEASURED) is recorded
+        ]
+        if some:
+            predictions = Predictions(posterior, Rows.of([run for _, run in some]), recorded)
+            of_stress, of_normal = map(predictions.bands, (posterior.predicting_best, weighed))
+            for (flow, _), first, others in zip(some, of_stress, of_normal, strict=True):
+                if first is not None and others is not None:
+                    ends = zip(astuple(first), astuple(others), strict=True)
+                    out[flow.key] = Band(*(columns_of(np.c_[a[:, :1], b[:, 1:]]) for a, b in ends))
+    return out
+
+
+def flow_run(flow: Flow, found: Found, runs: Mapping[str, Run]) -> Run:
+    """Return the run that a flow asks for; one at hand with its steps placed where they are."""
+    run = runs.get(flow.name) if flow.kind in MEASURED else None
+    if run is None:
+        return run_of(flow)
+    placed = [one for one in (*found.task.fitted, *found.task.held_out) if one.name == run.name]
+    return replace(run, rate_steps=placed[0].rate_steps) if placed else run
+
+
+def run_of(flow: Flow) -> Run:
+    """Return a flow, with the rate as it was recorded, as a run of which nothing is recorded."""
+    return replace(bare_run(flow.protocol, flow.times, flow.name), rate=flow.rate)
+
+
+def in_flows(
+    model: AugmentedModel,
+    thetas: Sequence[Float[np.ndarray, " p"]],
+    flows: Sequence[Flow],
+    runs: Sequence[Run] | None = None,
+) -> list[dict[str, Stresses | None]]:
+    """Return what vectors of constants predict in each flow, by its key; None where they diverge.
+
+    `runs`: that the flows ask for; by default of the fluid alone.
+    """
+    if not flows:
+        return [{} for _ in thetas]
+    runs = list(map(run_of, flows)) if runs is None else runs
+    with np.errstate(all="ignore"):
+        predicted = model.observables(thetas, make_batch(runs))
+    return [
+        {
+            flow.key: columns_of(rows[: len(flow.times)])
+            if np.all(np.isfinite(rows[: len(flow.times), 0]))
+            else None
+            for flow, rows in zip(flows, of_one, strict=True)
         }
-    told: queue.SimpleQueue[tuple[str, str, float] | Future[R]] = queue.SimpleQueue()
-    stop, fractions = Event(), dict.fromkeys(parts, 0.0)
-
-    def run(name: str, part: Callable[[Progress], R]) -> R:
-        def say(text: str, fraction: float) -> None:
-            if stop.is_set():
-                raise Stopped
-            told.put((name, text, fraction))
-
-        with may_be_stopped(stop):
-            return part(say)
-
-    with ThreadPoolExecutor(len(parts)) as pool:
-        try:
-            futures = {name: pool.submit(run, name, part) for name, part in parts.items()}
-            for future in futures.values():
-                future.add_done_callback(told.put)
-            running = len(futures)
-            while running:
-                try:
-                    one = told.get(timeout=_LOOK_UP)
-                except queue.Empty:
-                    continue
-                if isinstance(one, Future):
-                    one.result()  # or what it failed with
-                    running -= 1
-                    continue
-                name, text, fraction = one
-                fractions[name] = max(fractions[name], fraction)
-                progress(f"{name}: {text}", sum(fractions.values()) / len(fractions))
-        except BaseException:
-            stop.set()
-            raise
-    return {name: future.result() for name, future in futures.items()}
+        for of_one in predicted
+    ]

@@ -1,7 +1,7 @@
 """Comparison of estimators, or on data, in memory."""
 
 from collections.abc import Iterable, Mapping, Sequence, Sized
-from typing import Any, overload
+from typing import Any
 
 from discover.answer import TOLERANCE
 from discover.comparison.comparison import Comparison
@@ -24,33 +24,6 @@ from discover.study.in_memory import (
     with_known,
 )
 from discover.study.schema import Study
-
-
-@overload
-def compare(
-    first: Sequence[RunPrediction],
-    second: Dataset,
-    *,
-    train: Dataset | None = None,
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> Comparison: ...
-
-
-@overload
-def compare(
-    first: Dataset,
-    second: Fluid | None = None,
-    *,
-    held_out: HeldOut = (),
-    known_effects: Mapping[str, Any] | None = None,
-    free: Sequence[str] = (),
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-    progress: Progress | None = None,
-    **options: Any,
-) -> Comparison: ...
 
 
 def compare(

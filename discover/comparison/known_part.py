@@ -62,7 +62,7 @@ class Frame:
 
     def alone(self) -> dict[str, Stresses | None]:
         """Return what the known part alone predicts, by the key of the flow."""
-        found, _ = simulated(self.model.fluid, self.flows)
+        found = simulated(self.model.fluid, self.flows)
         return {flow.key: self.recorded(flow, found[flow.key]) for flow in self.flows}
 
 

@@ -1,11 +1,13 @@
 """Learners of a comparison, their results kept as they are found."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
+from threading import Event, Lock
+from typing import TypeVar
 
 import numpy as np
 
-from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome, bands_of_members, physics_of, simulated
 from discover.dataset.run import Run
@@ -14,7 +16,7 @@ from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.plain_numbers import plain
-from discover.progress import Progress, silent
+from discover.progress import Progress, Stopped, may_be_stopped, silent
 from discover.study.declared_model import StudyModel
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
@@ -107,10 +109,10 @@ class Learning:
             result, fluid = train(
                 learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
             )
-        predictions, seen = simulated(fluid, flows)
+        predictions = simulated(fluid, flows)
         outcome = LearnerOutcome(
             result.learner, result.terms, result.train_seconds, result.details, result.message,
-            predictions, physics_of(seen, flows),
+            predictions, physics_of(fluid, flows),
             bands_of_members(result, fluid, flows, predictions), self._left(fluid, frame),
         )  # fmt: skip
         if store is not None:
@@ -131,3 +133,46 @@ class Learning:
         fluid = replace(fluid, modulus_covariance=frame.model.modulus_covariance)
         loading, computed = study.compare.loading or 0.0, study.data.synthetic is not None
         return lack_of_fit(fluid, runs, study.loop.noise, loading, computed)
+
+
+R = TypeVar("R")
+
+_LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be interrupted
+
+
+def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
+    """Return what each part returns, all computed side by side.
+
+    Progress is passed on with the mean of the fractions, of one part at a time. If one part fails,
+    or the caller is interrupted, the others end where they next ask or say something.
+    """
+    if len(parts) < 2:
+        return {
+            name: part(lambda text, fraction, name=name: progress(f"{name}: {text}", fraction))
+            for name, part in parts.items()
+        }
+    stop, turn, fractions = Event(), Lock(), dict.fromkeys(parts, 0.0)
+
+    def run(name: str, part: Callable[[Progress], R]) -> R:
+        def say(text: str, fraction: float) -> None:
+            with turn:
+                if stop.is_set():
+                    raise Stopped
+                fractions[name] = max(fractions[name], fraction)
+                progress(f"{name}: {text}", sum(fractions.values()) / len(fractions))
+
+        with may_be_stopped(stop):
+            return part(say)
+
+    with ThreadPoolExecutor(len(parts)) as pool:
+        futures = {name: pool.submit(run, name, part) for name, part in parts.items()}
+        try:
+            running = set(futures.values())
+            while running:
+                ended, running = wait(running, _LOOK_UP, FIRST_COMPLETED)
+                for one in ended:
+                    one.result()  # or what it failed with
+        except BaseException:
+            stop.set()
+            raise
+    return {name: future.result() for name, future in futures.items()}

@@ -8,7 +8,8 @@ import numpy as np
 
 from discover import identify
 from discover.comparison.flows import DRAWN, QUANTITIES, Band, Flow, Stresses, columns_of
-from discover.identify.physics_flows import time_scale
+from discover.forward import make_batch
+from discover.forward.of_fluids import bare_run, followed, observed, pieces_in_time
 from discover.laws import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.lack_of_fit import LackOfFit
@@ -64,7 +65,7 @@ def bands_of_members(
     if len(result.members) < 2:
         return {}
     others = [replace(fluid, law=law) for law in result.members if law is not result.law]
-    members = [own, *(simulated(member, flows)[0] for member in others)]
+    members = [own, *(simulated(member, flows) for member in others)]
     bands = {}
     for flow in flows:
         told = [p for member in members if (p := member[flow.key]) is not None]
@@ -157,34 +158,21 @@ def _ratio(value: float, others: Sequence[float]) -> float:
     return value / largest if largest > 0.0 else float("inf") if value > 0.0 else 0.0
 
 
-def simulated(
-    fluid: Fluid, flows: Sequence[Flow]
-) -> tuple[dict[str, Stresses | None], identify.Seen]:
-    """Return what a fluid does in flows, by key, and what the checks of its physics are made of.
-
-    None where the law diverges. Training flows set the box beyond which the law extrapolates.
-    """
-    along = [flow for flow in flows if flow.kind in DRAWN]
-    training = [flow for flow in along if flow.kind == "training"] or along
-    time = time_scale(fluid)
-    weissenberg = time * max(flow.largest_rate for flow in training)
-    deborah = time * max(_frequency(flow) for flow in training)
-    protocols, times = [flow.protocol for flow in flows], [flow.times for flow in flows]
-    # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
-    seen = identify.see(fluid, protocols, times, weissenberg, max(deborah, weissenberg / 5.0))
-    pairs = zip(flows, seen.along.observed, strict=True)
-    return {f.key: columns_of(o) if np.all(np.isfinite(o)) else None for f, o in pairs}, seen
+_STRAIN_STEP = 0.15
+"""Largest strain of a step: the stress of a Giesekus fluid is then off by less than 1e-6."""
 
 
-def physics_of(seen: identify.Seen, flows: Sequence[Flow]) -> dict[str, Any]:
-    """Return checks of a fluid's physical soundness along the flows, as JSON-able values."""
-    names = {i: flow.title for i, flow in enumerate(flows) if flow.kind in DRAWN}
-    return identify.check_physics(seen, names).to_json()
+def simulated(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Stresses | None]:
+    """Return what a fluid does in flows, by key; None where the law diverges."""
+    runs = [followed(fluid, bare_run(flow.protocol, flow.times)) for flow in flows]
+    limits: dict[str, Any] = {"relaxation_time": fluid.settling_time}
+    limits["pieces"] = pieces_in_time(fluid, runs, _STRAIN_STEP)
+    found = observed([fluid], make_batch(runs, _STRAIN_STEP, **limits))[0]
+    rows = [(flow.key, own[: len(flow.times)]) for flow, own in zip(flows, found, strict=True)]
+    return {key: columns_of(own) if np.all(np.isfinite(own)) else None for key, own in rows}
 
 
-def _frequency(flow: Flow) -> float:
-    """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
-    if flow.is_of_states:
-        return flow.frequency or 0.0
-    whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
-    return max(whole, flow.frequency or 0.0)
+def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
+    """Return checks of a fluid's physical soundness as JSON-able values."""
+    training = [flow for flow in flows if flow.kind == "training"] or flows
+    return identify.check_physics(fluid, max(flow.largest_rate for flow in training)).to_json()

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from discover import identify
-from discover.comparison.bands import flow_run, in_flows
-from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
-from discover.comparison.hypotheses import terms_of
+from discover.comparison.flows import QUANTITIES, Flow, Stresses, relative_errors
+from discover.comparison.hypotheses import flow_run, in_flows, terms_of
+from discover.comparison.outcome import simulated
 from discover.dataset.run import Run
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
@@ -27,9 +27,6 @@ MOST_RIVALS = 8
 
 _POSSIBLE = 0.01
 """Probability from which on a hypothesis is a rival."""
-
-FOUND = "the law found"
-"""Name of the chosen law among those at which the structure is analysed."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +144,7 @@ def _simulate(
     whole = LawTerms({**dict.fromkeys(names, 0.0), **terms.coefficients}, terms.inner)
     law = law_of_terms(whole, model.law.linear_relaxation, model.law)
     fluid = Fluid(law, model.modulus, model.relaxation_time, model.solvent_viscosity)
-    return {flow.key: predict(fluid, flow) for flow in flows}
+    return simulated(fluid, flows)
 
 
 def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
@@ -170,29 +167,3 @@ def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | N
     # among the flows of the comparison if one of them will do
     place = place if separation > SEPARATED else rival.separated_by
     return replace(rival, errors_to_chosen=worst, separated_by=place)
-
-
-def law_structure(structure: identify.Structure | None) -> identify.LawStructure | None:
-    """Return the structure at the law found, or at the known part where that law diverges."""
-    if structure is None or not structure.laws:
-        return None
-    return next((law for law in structure.laws if law.name == FOUND), structure.laws[0])
-
-
-def structure_of(
-    terms: Sequence[LawTerm],
-    runs: Sequence[Run],
-    library: TermLibrary,
-    model: StudyModel,
-    use_normal_stresses: bool,
-    alone: identify.Structure | None = None,
-) -> identify.Structure:
-    """Return what the flows of these runs determine, at the known part and at the law found.
-
-    `alone`: the same at the known part, where that is known.
-    """
-    found = LawTerms.of(terms)
-    nominal = {FOUND: found} if found.coefficients else {}
-    return identify.analyse_structure(
-        runs, library, model.fluid, nominal, use_normal_stresses, alone
-    )

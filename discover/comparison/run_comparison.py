@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from discover.comparison.bands import flow_bands
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import (
@@ -23,17 +22,23 @@ from discover.comparison.flows import (
     with_each_run,
     without_spikes_in_fit,
 )
-from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
+from discover.comparison.hypotheses import (
+    MOST_EFFECTS,
+    flow_bands,
+    search_hypotheses,
+    terms_of,
+    with_proposals,
+)
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, study_library
-from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
+from discover.comparison.rivals import Rival, exact_twins, explanations_apart
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
-from discover.identify import Structure
+from discover.identify import Structure, analyse_structure
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
-from discover.learners.runs import waiting
+from discover.learners.settings import waiting
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
@@ -128,11 +133,15 @@ def compare(
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     times.learning()
 
+    def structure_at(terms: Sequence[LawTerm]) -> Structure | None:
+        runs, model = frame.data.fit.runs, frame.model
+        normal = options.use_normal_stresses
+        return analyse_structure(runs, library, terms, model.fluid, normal)
+
     sheared = any(flow.in_shear for flow in frame.flows if flow.kind == "training")
-    of = frame.data.fit.runs, library, frame.model, options.use_normal_stresses
     with ThreadPoolExecutor(1) as beside:
         # at a first start its program takes as long to compile as a learner learns
-        alone = beside.submit(copy_context().run, structure_of, (), *of) if sheared else None
+        alone = beside.submit(copy_context().run, structure_at, ()) if sheared else None
         own = learning.outcomes(options.learners, frame, times.learned)
     times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
@@ -170,7 +179,7 @@ def compare(
     )  # fmt: skip
 
     def determined(terms: Sequence[LawTerm]) -> Structure | None:
-        return None if alone is None else structure_of(terms, *of, alone.result())
+        return None if alone is None else structure_at(terms) or alone.result()
 
     comparison = _with_what_is_open(comparison, found, frame, data, study, library, determined)
     progress("done", 1.0)

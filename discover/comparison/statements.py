@@ -12,7 +12,6 @@ import numpy as np
 
 from discover.comparison.flows import MEASURED, QUANTITIES, Band, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.rivals import law_structure
 from discover.equations import Equation, Tested, combined
 from discover.equations.equation import box_of, flow_numbers
 from discover.errors import InputError
@@ -109,10 +108,8 @@ def _said_of(quantity, verdict, flows, bands, structure, spread, terms) -> State
         return Statement(quantity, "no", _UNEXPLAINED.format(said))
     if only_states(flows):
         return Statement(quantity, "no", ONLY_STATES)
-    at = law_structure(structure)
-    algebra = (
-        None if at is None else next((q for q in at.quantities if q.quantity == quantity), None)
-    )
+    told = () if structure is None else structure.quantities
+    algebra = next((one for one in told if one.quantity == quantity), None)
     if algebra is not None and algebra.verdict != "measured" and algebra.open:
         return Statement(quantity, "no", algebra.text)
     tested = flows_measured(flows)

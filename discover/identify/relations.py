@@ -2,17 +2,16 @@
 
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from math import gcd, lcm
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.identify.exact_series import ExactNotation
-from discover.words import percent_of
 from tensor_library.law_terms import spell
 from tensor_library.library import TermLibrary
 
@@ -38,21 +37,6 @@ class TermRelation:
 
     coefficients: Mapping[str, int]  # term → whole number
     touches: Reach
-
-    @property
-    def text(self) -> str:
-        """One sentence for a reader."""
-        sum_of_terms = spell(self.coefficients)
-        if self.touches == "nothing":
-            return f"In simple shear {sum_of_terms} = 0 at every state, whatever the law."
-        return (
-            f"In simple shear {sum_of_terms} has a single entry, the 33: N2 sees it, σ12 and N1 do "
-            "not unless the law lets σ33 act back on them."
-        )
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the relation as JSON-able values."""
-        return {**asdict(self), "text": self.text}
 
 
 MOST_SPELLED = 4
@@ -195,90 +179,45 @@ Linear identities commute with Runge–Kutta steps, so exact directions come out
 
 _ENTRY = 1e-7
 
-_WEAKEST = 5
-"""Directions that are not exact, of which no more are told."""
-
 
 @dataclass(frozen=True)
 class Direction:
-    """Change of the law's coefficients, its largest entry one.
+    """Change of the law's coefficients that the observed stresses do not see, to first order.
 
-    `noise_for_tenth`: relative noise at which the standard error along it is 0.1; zero for an exact
-    one. `changes`: relative change of σ12, N1, N2 (over N1) per unit. `at_any_size`: whether a
-    finite step leaves σ12 as it is too, or only follows the tangent of a curve; None where not
-    decided.
+    Its largest entry is one. `changes`: relative change of σ12, N1, N2 (over N1) per unit.
+    `at_any_size`: whether a finite step leaves σ12 as it is too, or only follows the tangent of a
+    curve; None where not decided.
     """
 
     coefficients: Mapping[str, float]  # term → entry
-    exact: bool  # whether the observed stresses do not change at all, to first order
-    noise_for_tenth: float
     changes: Mapping[str, float]
     at_any_size: bool | None = None
 
-    @property
-    def text(self) -> str:
-        """One sentence for a reader."""
-        what = spell_briefly(self.coefficients)
-        seen = [
-            f"{name} ({self.changes[name]:.2g})"
-            for name in ("N1", "N2")
-            if self.changes[name] > 1e-6
-        ]
-        touched = f"it changes {' and '.join(seen)}" if seen else "it changes neither N1 nor N2"
-        if self.exact:
-            return f"The data see nothing of {what}; {touched}."
-        return (
-            f"{what} is known to 0.1 only with noise below "
-            f"{percent_of(self.noise_for_tenth)}; {touched}."
-        )
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the direction as JSON-able values."""
-        return {**asdict(self), "text": self.text}
-
-
-def weak_directions(
+def unseen_directions(
     names: Sequence[str],
     observed: Float[np.ndarray, "rows n"],
     quantities: Mapping[str, Float[np.ndarray, "_ n"]],
-    n_observations: int,
-) -> tuple[list[Direction], list[Direction]]:
-    """Return the exact null directions and the weakest of the others.
+) -> list[Direction]:
+    """Return the exact null directions.
 
     `observed`: sensitivities, a column's norm being the relative rms change per unit of a
-    coefficient; `quantities`: of each quantity, likewise. `n_observations`: values with independent
-    noise.
+    coefficient; `quantities`: of each quantity, likewise.
     """
     norms = np.linalg.norm(observed, axis=0)
     scale = np.where(norms > EXACT * np.max(norms, initial=1.0), norms, 1.0)
     _, values, right = np.linalg.svd(observed / scale, full_matrices=True)
     values = np.concatenate([values, np.zeros(right.shape[0] - values.size)])
-    null = values <= EXACT * max(values[0], 1e-300)
-    exact = [
-        _direction(names, vector, observed, quantities, n_observations, True)
-        for vector in _sparse_basis(right[null] / scale)
-        if np.any(vector)  # of fewer samples than terms, elimination may use a direction up
-    ]
-    near = [
-        _direction(names, vector / scale, observed, quantities, n_observations, False)
-        for vector in right[~null][::-1][:_WEAKEST]
-    ]
-    return exact, near
-
-
-def _direction(names, vector, observed, quantities, n_observations, exact) -> Direction:
-    vector = vector / vector[np.argmax(np.abs(vector))]
-    signal = float(np.linalg.norm(observed @ vector))
-    return Direction(
-        {
-            names[i]: float(np.round(vector[i], 12))
-            for i in np.flatnonzero(np.abs(vector) > (_ENTRY if exact else 0.02))
-        },
-        exact,
-        # the standard error of a unit step is noise / (√n · signal)
-        0.0 if exact else 0.1 * float(np.sqrt(n_observations)) * signal,
-        {key: float(np.linalg.norm(block @ vector)) for key, block in quantities.items()},
-    )
+    found = []
+    for vector in _sparse_basis(right[values <= EXACT * max(values[0], 1e-300)] / scale):
+        if not np.any(vector):
+            continue  # of fewer samples than terms, elimination may use a direction up
+        vector = vector / vector[np.argmax(np.abs(vector))]
+        entries = np.flatnonzero(np.abs(vector) > _ENTRY)
+        coefficients = {names[i]: float(np.round(vector[i], 12)) for i in entries}
+        sizes = {q: float(np.linalg.norm(block @ vector)) for q, block in quantities.items()}
+        found.append(Direction(coefficients, sizes))
+    return found
 
 
 def _sparse_basis(rows: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k n"]:

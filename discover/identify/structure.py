@@ -4,7 +4,7 @@ Null space of the exact sensitivities of σ12 to the coefficients at a nominal l
 N1 and N2. First order; where the law is a polynomial, exact arithmetic decides on finite sizes.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float, Int
 
 from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
@@ -28,22 +28,16 @@ from discover.forward.fluids import (
 from discover.forward.of_fluids import pieces_in_time
 from discover.forward.stepping import follow
 from discover.identify.exact_series import same_shear_stress
-from discover.identify.relations import (
-    Direction,
-    TermRelation,
-    spell_briefly,
-    term_relations,
-    weak_directions,
-)
+from discover.identify.relations import Direction, spell_briefly, unseen_directions
 from discover.identify.side_by_side import joint_library
-from discover.identify.twins import HiddenStresses, hidden_stresses
+from discover.identify.twins import hidden_stresses
 from discover.laws import Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.laws.expansion import expansion_of, law_of_terms
-from discover.learners.runs import as_runs
+from discover.learners.settings import as_runs
 from discover.programs import compiled
 from discover.summary_view import NotebookView, table_of
-from discover.words import percent_of
+from discover.words import counted
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 from tensor_library.algebra import contracted, rate_of_deformation
 
@@ -115,13 +109,6 @@ _FINITE_STEP = Fraction(1, 10)
 _FINITE_ORDER = 8
 _NORMAL_STRESSES = ("N1", "N2")
 
-NOMINAL: Mapping[str, LawTerms] = {
-    "with slip": LawTerms({"sigma.gammadot+gammadot.sigma": 0.2}),
-    "with quadratic relaxation": LawTerms({"sigma.sigma": 0.2}),
-    "with relaxation that grows with the trace": LawTerms({"tr(sigma)*sigma": 0.3}),
-}
-"""Nominal laws of ordinary strength: Johnson–Segalman, Giesekus and linear PTT, beyond UCM."""
-
 
 @dataclass(frozen=True)
 class QuantityVerdict:
@@ -147,111 +134,59 @@ class QuantityVerdict:
 
 
 @dataclass(frozen=True)
-class LawStructure(NotebookView):
-    """What the experiment can determine around one nominal law."""
+class Structure(NotebookView):
+    """What an experiment can determine of a library around one law."""
 
-    name: str
     law: LawTerms  # its terms beyond the known part
-    hidden: HiddenStresses  # what σ12 feels of the normal stresses
-    exact: tuple[Direction, ...]  # unseen
-    weak: tuple[Direction, ...]  # the weakest of the others
+    n_terms: int  # size of the library
+    unseen: tuple[Direction, ...]  # changes of the law that no datum sees
     quantities: tuple[QuantityVerdict, ...]  # verdicts on N1 and N2 from what is observed
-    n_exact_with_N1: int  # unseen directions that were left if N1 were measured as well
-    N2_with_N1: Verdict  # verdict on N2 if N1 were measured as well
 
     @property
     def text(self) -> str:
-        """The verdicts, one sentence each."""
-        return " ".join(q.text for q in self.quantities)
-
-    def line(self) -> dict[str, Any]:
-        """Return the law as one line of a table: combinations that no datum sees, and verdicts."""
-        verdicts = {q.quantity: q.verdict for q in self.quantities}
-        unseen = {"unseen": len(self.exact), "unseen_with_N1": self.n_exact_with_N1}
-        return {"law": self.name, **unseen, **verdicts, "N2_with_N1": self.N2_with_N1}
+        """How much the flows leave unseen, and the verdicts, for a reader."""
+        count = counted(len(self.unseen), "combination")
+        return (
+            f"These flows leave {count} of the {self.n_terms} coefficients of the library unseen, "
+            f"however small the noise. {' '.join(one.text for one in self.quantities)}"
+        )
 
     def table(self) -> pd.DataFrame:
         """Return the verdicts on N1 and N2, one line each."""
         return table_of(self.quantities)
 
     def _shown(self) -> Iterable[Any]:
-        yield f"Around {self.name}:"
-        yield self.table()
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the structure as JSON-able values."""
-        return {
-            "law": self.name,
-            "terms": dict(self.law.coefficients),
-            "hidden_stresses": self.hidden.to_json(),
-            "unseen_directions": [d.to_json() for d in self.exact],
-            "weak_directions": [d.to_json() for d in self.weak],
-            "quantities": [asdict(q) for q in self.quantities],
-            "unseen_directions_with_N1": self.n_exact_with_N1,
-            "N2_with_N1": self.N2_with_N1,
-            "text": self.text,
-        }
-
-
-@dataclass(frozen=True)
-class Structure(NotebookView):
-    """What an experiment can determine of a library, at the known part and at nominal laws."""
-
-    laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
-    relations: tuple[TermRelation, ...]  # exact relations among terms in shear, at any law
-    n_terms: int  # size of the library
-
-    @property
-    def text(self) -> str:
-        """One sentence for a reader."""
-        counts = ", ".join(f"{len(law.exact)} at {law.name}" for law in self.laws)
-        return (
-            f"Of the {self.n_terms} coefficients of the library these flows leave unseen, however "
-            f"small the noise, this many combinations: {counts}."
-        )
-
-    def table(self) -> pd.DataFrame:
-        """Return how many combinations stay unseen, and the verdicts, one line for each law."""
-        return table_of(self.laws)
-
-    def _shown(self) -> Iterable[Any]:
-        yield self.text
+        yield self.text.partition(". ")[0] + "."
         yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the structure as ``comparison.json`` holds it."""
         return {
-            "text": self.text,
+            "terms": dict(self.law.coefficients),
             "n_terms": self.n_terms,
-            "relations": [relation.to_json() for relation in self.relations],
-            "laws": [law.to_json() for law in self.laws],
+            "unseen_directions": [asdict(one) for one in self.unseen],
+            "quantities": [asdict(one) for one in self.quantities],
+            "text": self.text,
         }
-
-
-_ALONE = "the known part alone"
 
 
 def analyse_structure(
     runs: Sequence[Run],
     library: TermLibrary,
+    law: LawTerms | Sequence[LawTerm] = (),
     known: Fluid | None = None,
-    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None,
     use_normal_stresses: bool = False,
-    alone: Structure | None = None,
-) -> Structure:
-    """Return what shear flows can determine of a library's coefficients.
+) -> Structure | None:
+    """Return what shear flows can determine of a library around a law; None where it diverges.
 
     `runs`: their protocols and times; with `use_normal_stresses`, N1 and N2 that they hold count as
-    measured. `known`: known part; by default UCM with G = 1 Pa and λ = 1 s. `nominal`: laws around
-    which to look besides it; by default those of `NOMINAL` in the library.
+    measured. `law`: beyond the known part, such as ``TensorSINDy.terms_``. `known`: known part; by
+    default UCM with G = 1 Pa and λ = 1 s.
     """
     known = Fluid() if known is None else known
-    if nominal is None:
-        nominal = {k: v for k, v in NOMINAL.items() if set(v.coefficients) <= set(library.names)}
-    laws = {k: v if isinstance(v, LawTerms) else LawTerms.of(v) for k, v in nominal.items()}
-    library = joint_library(library, list(laws.values()))
-    runs = as_runs(runs, np.asarray(known.relaxation_time), known.law.linear_relaxation)
-    total = sum(map(len, runs))
+    law = law if isinstance(law, LawTerms) else LawTerms.of(law)
+    library, base = joint_library(library, [law]), known.law
+    runs = as_runs(runs, np.asarray(known.relaxation_time), base.linear_relaxation)
     runs = [thin_run(run, _ROWS) for run in runs]
     flows = lay_out(
         [run.protocol for run in runs],
@@ -261,74 +196,61 @@ def analyse_structure(
         pieces=pieces_in_time(known, runs, _STRAIN_STEP),
     )
     normal = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
-    also = [
+    observed = ["sigma12"] + [
         quantity
         for quantity, column in normal.items()
         if use_normal_stresses and any(getattr(run, column) is not None for run in runs)
     ]
-    if alone is not None and alone.n_terms == len(library):
-        found, relations = [*alone.laws], alone.relations
-    else:
-        found, relations, laws = [], term_relations(library), {_ALONE: LawTerms({}), **laws}
-    longest = max(map(len, runs))
-    samples = np.arange(longest) < np.array([[len(run)] for run in runs])
-    for name, law in laws.items():
-        one = _at(known, flows, samples, total, library, name, law, ["sigma12", *also])
-        if one is not None:
-            found.append(one)
-    return Structure(tuple(found), relations, len(library))
-
-
-def _at(
-    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], total: int,
-    library: TermLibrary, name: str, law: LawTerms, observed: Sequence[str],
-) -> LawStructure | None:  # fmt: skip
-    """Return the structure at one law, or None where it diverges in these flows."""
-    base = known.law
     whole = expansion_of(law, library, base.linear_relaxation, base)
-    value, columns = with_sensitivities(whole, known, flows)
-    shape = samples[..., None]
-    stresses = np.where(shape, np.asarray(value)[:, : samples.shape[1]], 0.0)
-    sensitivity = np.where(shape[..., None], np.asarray(columns)[:, : samples.shape[1]], 0.0)
-    if not (np.all(np.isfinite(stresses)) and np.all(np.isfinite(sensitivity))):
+    blocks = _sensitivities(whole, known, flows, np.array([[len(run)] for run in runs]))
+    if blocks is None:
         return None
-    # relative to the root-mean-square of each run; N2 to that of N1
-    scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
-    scale[:, 2] = scale[:, 1]
-    blocks: dict[str, Float[np.ndarray, "rows n"]] = {}
-    for kind, quantity in enumerate(("sigma12", *_NORMAL_STRESSES)):
-        sizes = np.where(scale[:, kind] > 0, scale[:, kind], 1.0)[:, None, None]
-        block = sensitivity[:, :, kind] / sizes
-        rows = block[samples][:: max(1, samples.sum() // _ROWS)]
-        blocks[quantity] = rows / np.sqrt(len(rows))
-    exact, weak = _directions(library, blocks, observed, total)
-    exact = [_finite(d, law, base) for d in exact]
-    with_n1 = list(dict.fromkeys([*observed, "N1"]))
-    left, _ = _directions(library, blocks, with_n1, total)
+    unseen = _unseen(library, blocks, observed)
+    exact = tuple(_finite(direction, law, base) for direction in unseen)
     numbers = range(known.n_modes) if differs_by_mode(base) else [0]
     # without terms that are zero: what a program differentiates it takes long to compile
     alone = law_of_terms(law, base.linear_relaxation, base)
     of_modes = [hidden_stresses(law_of_mode(alone, number)) for number in numbers]
     hidden = max(of_modes, key=lambda one: len(one.unfelt))
-    verdicts = tuple(
-        _verdict(q, list(observed), exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES
-    )
-    n2_with_n1: Verdict = "undetermined" if _changing(left, "N2") else "determined"
-    if "N2" in observed:
-        n2_with_n1 = "measured"
-    elif n2_with_n1 == "undetermined" and verdicts[1].verdict == "undetermined":
+    verdicts = [_verdict(q, observed, exact, hidden, len(library)) for q in _NORMAL_STRESSES]
+    if verdicts[1].verdict == "undetermined" and _changing(
+        _unseen(library, blocks, list(dict.fromkeys([*observed, "N1"]))), "N2"
+    ):
         text = verdicts[1].text + " Measuring N1 as well would not change this."
-        verdicts = (verdicts[0], replace(verdicts[1], text=text))
-    return LawStructure(
-        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1
-    )
+        verdicts[1] = replace(verdicts[1], text=text)
+    return Structure(law, len(library), exact, tuple(verdicts))
 
 
-def _directions(library, blocks, observed, total):
+def _sensitivities(
+    law: LibraryExpansion, known: Fluid, flows: FlowBatch, lengths: Int[np.ndarray, "runs 1"]
+) -> dict[str, Float[np.ndarray, "rows n"]] | None:
+    """Return relative derivatives of each quantity by the coefficients; None if the law diverges.
+
+    Over the root-mean-square of each run, N2 over that of N1.
+    """
+    value, columns = with_sensitivities(law, known, flows)
+    samples = np.arange(np.max(lengths)) < lengths
+    shape = samples[..., None]
+    stresses = np.where(shape, np.asarray(value)[:, : samples.shape[1]], 0.0)
+    sensitivity = np.where(shape[..., None], np.asarray(columns)[:, : samples.shape[1]], 0.0)
+    if not (np.all(np.isfinite(stresses)) and np.all(np.isfinite(sensitivity))):
+        return None
+    scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
+    scale[:, 2] = scale[:, 1]
+    blocks = {}
+    for kind, quantity in enumerate(("sigma12", *_NORMAL_STRESSES)):
+        sizes = np.where(scale[:, kind] > 0, scale[:, kind], 1.0)[:, None, None]
+        block = sensitivity[:, :, kind] / sizes
+        rows = block[samples][:: max(1, samples.sum() // _ROWS)]
+        blocks[quantity] = rows / np.sqrt(len(rows))
+    return blocks
+
+
+def _unseen(library, blocks, observed) -> list[Direction]:
     stacked = np.concatenate([blocks[q] for q in observed])
     # rows beyond the number of unknowns say nothing more to a null space
     reduced = np.asarray(np.linalg.qr(stacked, mode="r"))
-    return weak_directions(library.names, reduced, blocks, total * len(observed))
+    return unseen_directions(library.names, reduced, blocks)
 
 
 def _changing(directions: Sequence[Direction], quantity: str) -> list[Direction]:
@@ -351,7 +273,7 @@ def _finite(direction: Direction, law: LawTerms, base) -> Direction:
     return replace(direction, at_any_size=same)
 
 
-def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdict:
+def _verdict(quantity, observed, exact, hidden, n_terms) -> QuantityVerdict:
     if quantity in observed:
         return QuantityVerdict(quantity, "measured", f"{quantity} is measured.")
     what = " and ".join("σ12" if q == "sigma12" else q for q in observed)
@@ -378,12 +300,6 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
         return QuantityVerdict(quantity, "assumed", text)
     text = (
         f"If the law is in this library of {n_terms} terms, with the convected derivative that was "
-        f"assumed, {what} determines {quantity}"
+        f"assumed, {what} determines {quantity}."
     )
-    feeble = [d for d in weak if d.changes[quantity] > 0.1]
-    if feeble:
-        limit = min(d.noise_for_tenth for d in feeble)
-        text += (
-            f"; a library of which every term were free would need noise below {percent_of(limit)}"
-        )
-    return QuantityVerdict(quantity, "determined", text + ".")
+    return QuantityVerdict(quantity, "determined", text)

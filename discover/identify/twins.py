@@ -218,11 +218,9 @@ class HiddenStresses:
     """What σ12 feels of the normal stresses in one law.
 
     `unfelt`: orthonormal combinations of (σ11, σ22, σ33) that never reach σ12, shape (k, 3).
-    `felt`: for N1 and N2, whether the difference is free of them.
     """
 
     unfelt: Float[np.ndarray, "k 3"]
-    felt: dict[str, bool]
 
     def leaves_no_trace(self, quantity: str) -> bool:
         """Return whether one of the two stresses that make N1 or N2 never reaches σ12 at all."""
@@ -248,10 +246,6 @@ class HiddenStresses:
             )
         return f"A change of {' or of '.join(listed)} never reaches σ12."
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the combinations as JSON-able values."""
-        return {"unfelt": self.unfelt.tolist(), "felt": dict(self.felt), "text": self.text}
-
 
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, at its states in random histories.
@@ -274,12 +268,7 @@ def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
         _, values, right = np.linalg.svd(rows)
         felt_rows = right[: len(values)][values > _ZERO * values[0]]
     _, values, right = np.linalg.svd(np.concatenate([felt_rows[:, :3], np.zeros((3, 3))]))
-    unfelt = _readable(right[values <= _ZERO * max(values[0], 1e-300)])
-    felt = {
-        name: bool(np.all(np.abs(unfelt @ difference) < 1e-8))
-        for name, difference in _DIFFERENCES.items()
-    }
-    return HiddenStresses(unfelt, felt)
+    return HiddenStresses(_readable(right[values <= _ZERO * max(values[0], 1e-300)]))
 
 
 @compiled

@@ -21,15 +21,12 @@ class RecoveredTerm(LawTerm):
 
     `coefficient`: refitted without penalty. `coefficient_penalised`: of the penalised problem that
     selected the term, if any. `latex`: the term without its coefficient. `inner_ci95`: of the inner
-    parameters. `inner_at_one`: these (value, low, high) if the coefficient is one, where it may be.
+    parameters.
     """
 
     coefficient_penalised: float | None = field(default=None, kw_only=True)
     latex: str = field(default="", kw_only=True)
     inner_ci95: Mapping[str, Interval] = field(default_factory=dict, kw_only=True)
-    inner_at_one: Mapping[str, tuple[float, float, float]] = field(
-        default_factory=dict, kw_only=True
-    )
 
     @property
     def is_told_from_zero(self) -> bool:

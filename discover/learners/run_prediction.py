@@ -19,8 +19,13 @@ from discover.forward.of_fluids import followed, observed, pieces_in_time
 from discover.learners.files import Provenance, provenance_of, write_estimator
 from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.results import estimates_of
-from discover.learners.runs import as_runs, require_signal
-from discover.learners.settings import check_settings, known_part, require_known_rate
+from discover.learners.settings import (
+    as_runs,
+    check_settings,
+    known_part,
+    require_known_rate,
+    require_signal,
+)
 from discover.linear_algebra_threads import in_one_thread
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell

@@ -1,14 +1,21 @@
-"""What estimators are given: settings, and the known part of the fluid; checked in `fit`."""
+"""What estimators are given: settings, the known part of the fluid, runs; checked in `fit`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from numbers import Integral
 from typing import Any
 
-from discover.dataset.run import Run
+import numpy as np
+from jaxtyping import ArrayLike
+
+from discover.dataset.material_functions import as_compared
+from discover.dataset.run import Run, require_later_samples
 from discover.errors import InputError
+from discover.first_use import require_double
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.laws.registry import check_law
 from discover.progress import checked
+from discover.protocols import settled
 from discover.protocols.kinematics import FOLLOWED
 from tensor_library.library import TermLibrary, build_library
 
@@ -77,4 +84,58 @@ def require_known_rate(known: Fluid, runs: Sequence[Run]) -> None:
                 f"The run {run.name!r} has no known shear rate, and a learner cannot solve for "
                 f"it with {type(known.law).__name__}, which has variables besides the "
                 "stress. Leave the run out, or use close_loop, which takes it."
+            )
+
+
+_MAKE = "Load a folder with load_dataset, or make a data set of a table with from_dataframe."
+
+
+def as_runs(
+    runs: Iterable[Run], relaxation_time: ArrayLike = 0.0, relaxes: bool = True
+) -> list[Run]:
+    """Return the runs as a list, each as `as_compared` has it.
+
+    `relaxation_time`: of the modes, in s. `relaxes`: whether the fluid is known to relax, so that a
+    periodic start is solved for; otherwise, or at a given stress, cycles are put before the run.
+    Raises InputError if there is no run, one is something else, a mode is too slow, or JAX computes
+    in single precision.
+    """
+    require_double()
+    if isinstance(runs, Run):
+        raise InputError(
+            f"A learner takes several runs; got the single run {runs.name!r}. Put it in a list: "
+            "fit([run])."
+        )
+    if isinstance(runs, str) or not isinstance(runs, Iterable):
+        raise InputError(
+            f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__}. {_MAKE}"
+        )
+    listed = list(runs)
+    if not listed:
+        raise InputError("A learner needs at least one run; got none.")
+    for run in listed:
+        if not isinstance(run, Run):
+            raise InputError(
+                f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__} "
+                f"that holds a {type(run).__name__}. {_MAKE}"
+            )
+    require_later_samples(listed)
+    longest = float(np.max(np.asarray(relaxation_time)))
+    return [waiting(run, longest, relaxes) for run in as_compared(listed)]
+
+
+def waiting(run: Run, relaxation_time: float, relaxes: bool) -> Run:
+    """Return a run with the cycles before it to wait for, if its state is not solved for."""
+    if relaxes and run.protocol.control == "rate":
+        return run
+    return replace(run, protocol=settled(run.protocol, relaxation_time))
+
+
+def require_signal(runs: Sequence[Run]) -> None:
+    """Refuse runs whose record is zero throughout."""
+    for run in runs:
+        if not np.any(run.recorded):
+            raise InputError(
+                f"The shear stress of the run {run.name!r} is zero throughout: it says nothing of "
+                "the law. Leave the run out."
             )

@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from discover.comparison import compare, relative_errors
 from discover.comparison.flows import Flow, thinned_to, true_terms, without_spikes_in_fit
-from discover.comparison.hypotheses import at_once
+from discover.comparison.learning import at_once
 from discover.comparison.outcome import place
 from discover.comparison.run_comparison import data_in_words
 from discover.dataset import Dataset, Run

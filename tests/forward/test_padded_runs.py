@@ -1,10 +1,8 @@
 """Runs of one batch, padded to one length: each is predicted as by itself."""
 
 import numpy as np
-from vectors import vector_of
 
 from discover.dataset import Run
-from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.loop.measured_rates import with_places, with_rate_steps
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up

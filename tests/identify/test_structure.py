@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.identify.physics import check_physics, see
+from discover.identify.physics import check_physics
 from discover.identify.structure import analyse_structure
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
-from discover.protocols import imposed_stress, in_flow, oscillatory_shear, start_up
+from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
 from tensor_library import LawTerms, TermLibrary, build_library, parse_term
 
@@ -28,88 +28,69 @@ def runs():
     return list(synthetic_dataset("ucm", {}, protocol=FLOWS, n_samples=33, duration=6.0))
 
 
-@pytest.fixture(scope="module")
-def structure(runs):
-    return analyse_structure(runs, LIBRARY)
-
-
-def at(structure, fragment):
-    return next(law for law in structure.laws if fragment in law.name)
+def verdicts(found):
+    return {one.quantity: one.verdict for one in found.quantities}
 
 
 @pytest.mark.slow
-def test_n1_follows_from_the_assumed_derivative_and_with_slip_n2_from_neither(structure):
-    law = at(structure, "known part")
-    assert law.line()["N1"] == "undetermined"
-    assert "convected derivative" in law.text
-    assert "not from the data" in law.text
+def test_n1_follows_from_the_assumed_derivative_and_with_slip_n2_from_neither(runs):
+    found = analyse_structure(runs, LIBRARY)
+    assert verdicts(found)["N1"] == "undetermined"
+    assert "convected derivative" in found.text
+    assert "not from the data" in found.text
     # σ11 alone: it enters no equation that σ12 feels
-    supports = [set(d.coefficients) for d in law.exact if d.changes["N1"] > 1e-6]
-    assert supports
-    law = at(structure, "slip")
-    assert law.line()["N2"] == "undetermined"
-    assert law.N2_with_N1 == "undetermined"
-    assert "Measuring N1 as well would not change this" in law.text
-    tangents = [set(d.coefficients) for d in law.exact]
+    assert any(d.changes["N1"] > 1e-6 for d in found.unseen)
+    found = analyse_structure(runs, LIBRARY, LawTerms({SLIP: 0.2}))
+    assert verdicts(found)["N2"] == "undetermined"
+    assert "Measuring N1 as well would not change this" in found.text
     # d/dξ of the twins: (σγ̇ + γ̇σ)/2 against (1 − ξ) tr(σ) γ̇ ... both unseen to first order
-    assert {SLIP, "tr(sigma)*gammadot"} in tangents
-    curved = next(d for d in law.exact if set(d.coefficients) == {SLIP, "tr(sigma)*gammadot"})
+    (curved,) = (d for d in found.unseen if set(d.coefficients) == {SLIP, "tr(sigma)*gammadot"})
     assert curved.at_any_size is False  # c = ξ(1 − ξ/2) is a curve
 
 
 @pytest.mark.slow
 def test_the_tangent_of_the_twins_has_the_slope_of_their_formula(runs):
-    structure = analyse_structure(
-        runs, LIBRARY, nominal={"twin": LawTerms({"tr(sigma)*gammadot": 0.32})}
-    )
-    law = at(structure, "twin")
+    found = analyse_structure(runs, LIBRARY, LawTerms({"tr(sigma)*gammadot": 0.32}))
     # both single-term twins have the coefficient 0.32: their difference is unseen at any size
-    pair = next(d for d in law.exact if "tr(sigma.gammadot)*I" in d.coefficients)
+    pair = next(d for d in found.unseen if "tr(sigma.gammadot)*I" in d.coefficients)
     assert pair.changes["sigma12"] < 1e-10
 
 
-def test_quadratic_relaxation_determines_n1_but_not_n2_and_unseen_directions_are_counted(structure):
+def test_quadratic_relaxation_determines_n1_but_not_n2_and_unseen_directions_are_counted(runs):
     # negative control for N1
-    law = at(structure, "quadratic")
-    assert law.line()["N1"] == "determined"
-    assert law.line()["N2"] == "undetermined"
-    assert all(d.changes["N1"] < 1e-8 for d in law.exact)
-    for law in structure.laws[:3]:
-        assert all(d.changes["sigma12"] < 1e-10 for d in law.exact)  # rounding
-        assert all(d.changes["sigma12"] > 1e-10 for d in law.weak)
-        pairs = [set(d.coefficients) for d in law.exact if d.at_any_size]
-        assert {"gammadot.gammadot", "tr(gammadot.gammadot)*I"} in pairs
-    content = json.loads(json.dumps(structure.to_json(), allow_nan=False))
+    found = analyse_structure(runs, LIBRARY, LawTerms({"sigma.sigma": 0.2}))
+    assert verdicts(found) == {"N1": "determined", "N2": "undetermined"}
+    assert all(d.changes["N1"] < 1e-8 for d in found.unseen)
+    assert all(d.changes["sigma12"] < 1e-10 for d in found.unseen)  # rounding
+    pairs = [set(d.coefficients) for d in found.unseen if d.at_any_size]
+    assert {"gammadot.gammadot", "tr(gammadot.gammadot)*I"} in pairs
+    content = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert content["n_terms"] == len(LIBRARY)
-    assert str(len(structure.laws[0].exact)) in content["text"]
+    assert f"{len(found.unseen)} combination" in content["text"]
 
 
 def test_measured_normal_stresses_are_not_called_undetermined(runs):
     ones = np.ones_like(runs[0].time)
     both = {"first_normal_stress_difference": ones, "second_normal_stress_difference": ones}
     with_both = [replace(run, **both) for run in runs]
-    structure = analyse_structure(with_both, LIBRARY, nominal={}, use_normal_stresses=True)
-    assert [q.verdict for q in structure.laws[0].quantities] == ["measured", "measured"]
+    found = analyse_structure(with_both, LIBRARY, use_normal_stresses=True)
+    assert verdicts(found) == {"N1": "measured", "N2": "measured"}
 
 
-WAVES = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}
 FLOW_CURVE = "flow curve monotonic"
 EXTENSION = "steady extension bounded"
-TERMS = ("sigma", "gammadot", "sigma.sigma", "tr(sigma)*sigma")
+TERMS = ("sigma", "sigma.sigma")
 
 
 def expansion(**coefficients):
     """One structure for every library law here, so that they share programs."""
     library = TermLibrary(tuple(parse_term(name) for name in TERMS))
-    values = [coefficients.get(key, 0.0) for key in ("linear", "viscous", "quadratic", "trace")]
+    values = [coefficients.get(key, 0.0) for key in ("linear", "quadratic")]
     return LibraryExpansion(jnp.array(values), jnp.zeros(0), library)
 
 
 def report(law, solvent=0.0):
-    flows = list(WAVES.values())
-    fluid = Fluid(law, 1.0, 1.0, solvent)
-    seen = see(fluid, flows, [np.linspace(0, 10, 81)] * 2, 2.0, 1.0)
-    return check_physics(seen, dict(enumerate(WAVES)))
+    return check_physics(Fluid(law, 1.0, 1.0, solvent), 2.0)
 
 
 @pytest.fixture(scope="module")
@@ -155,9 +136,6 @@ def test_enough_solvent_makes_slip_monotonic_and_linear_terms_and_feedback_are_c
     assert changed.value == pytest.approx(0.1 / 1.1, rel=1e-3)
     # h = −1.5 σ: stress grows by itself
     checks = report(expansion(linear=-1.5))
-    # where the conformation tensor loses definiteness the stored energy is not defined
-    names = ("dissipation non-negative", "conformation tensor positive definite")
-    assert False in [checks[name].passed for name in names]
     assert checks[EXTENSION].passed is False
 
 
@@ -166,34 +144,3 @@ def test_giesekus_is_monotonic_up_to_a_mobility_of_one_half(mobility, monotonic)
     checks = report(Giesekus(mobility))
     assert checks[FLOW_CURVE].passed is monotonic
     assert checks[EXTENSION].passed
-
-
-def test_in_extension_the_dissipation_is_that_of_extension():
-    times = np.array([40.0, 50.0])
-    seen = see(Fluid(), [in_flow(start_up(0.2), "uniaxial")], [times], 2.0, 1.0)
-    # A = diag(1/(1 − 2ε̇), 1/(1 + ε̇), 1/(1 + ε̇)), and tr(A + A⁻¹ − 2I)/2 is lost; what is left of
-    # the start is exp(−24), and steps err by 1e-6
-    lost = 0.5 * sum(a + 1.0 / a - 2.0 for a in (1.0 / 0.6, 1.0 / 1.2, 1.0 / 1.2))
-    assert seen.along.dissipation[0] == pytest.approx(lost, rel=1e-5)
-
-
-def test_where_no_rate_is_given_conformations_are_those_of_oscillations_like_in_training():
-    times = np.linspace(0.5, 10.0, 20)
-    creep, start = imposed_stress(times, np.ones(20)), start_up(1.0)
-    seen = see(Fluid(solvent_viscosity=0.1), [creep, start], [times, times], 2.0, 1.0)
-    told = [check_physics(seen, names).checks[0] for names in ({0: "creep"}, {0: "creep", 1: "b"})]
-    assert [one.passed for one in told] == [True, True]
-    assert told[0].where.startswith("oscillation at Wi = 2, ")
-    assert told[1].where == "b"
-
-
-def test_negative_viscosity_does_negative_work_and_a_law_that_runs_away_ends_its_box():
-    # h = 2 γ̇: the elastic response has the wrong sign
-    checks = report(expansion(viscous=2.0))
-    assert checks["work over a cycle non-negative"].passed is False
-    # −0.1 tr(σ)σ thins the relaxation until it turns into growth
-    checks = report(expansion(trace=-0.1))
-    reach = checks["integrates beyond training"]
-    assert reach.passed is False
-    assert 0.0 <= reach.value < 10.0
-    assert "diverges" in reach.text

@@ -13,17 +13,12 @@ from independent.noise import white
 from noisy_runs import run_at, start_ups
 
 import discover as dc
-from discover.forward import make_batch
-from discover.forward.grid import STRAIN_STEP
-from discover.forward.of_fluids import observed
-from discover.learners.runs import as_runs, with_shorter_holds
-from discover.learners.settings import known_part
+from discover.learners.settings import as_runs, known_part
 from discover.learners.tbnn_ude import estimator as of_network
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import without_network
 from discover.protocols import (
     after_alternation,
-    measured_rate,
     oscillatory_shear,
     shear_rates,
     step_rates,
@@ -144,40 +139,6 @@ def records(noise=0.01, seed=0):
         rates, noisy = np.where(times < 2.0, 1.0, rate), white(exact, noise, generator)
         runs.append(dc.Run(f"to_{rate:g}", times, step_rates(*flow), rates, noisy))
     return runs
-
-
-def predicted(runs, law):
-    batch = make_batch(runs, STRAIN_STEP, relaxation_time=SHORT)
-    fluid = dc.Fluid(dc.make_law(*law), SOFT, SHORT)
-    return observed([fluid], batch)[0, :, :, 0], np.max(np.sum(batch.parts[0].pieces, axis=1))
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        ("giesekus", {"alpha": 0.4}),
-        pytest.param(("johnson_segalman", {"xi": 0.3}), marks=pytest.mark.slow),
-    ],
-)
-def test_laws_record_the_same_on_shortened_runs_in_few_steps(law):
-    runs = records(noise=0.0)
-    whole, many = predicted(runs, law)
-    shorter, few = predicted(with_shorter_holds(runs, SHORT), law)
-    np.testing.assert_allclose(shorter, whole, atol=1e-5 * np.max(np.abs(whole)))
-    assert 3 * few < many
-
-
-def test_what_is_held_only_shortly_or_not_at_all_stays_as_it_is():
-    times = np.linspace(0.01, 60.0, 400)
-    for flow in (
-        oscillatory_shear(4.0, 1.0),
-        measured_rate(times, 4.0 * np.cos(times)),
-        measured_rate(times, np.geomspace(10.0, 0.01, times.size)),
-    ):
-        run = dc.Run("a", times, flow, np.ones(times.size), np.ones(times.size))
-        assert with_shorter_holds([run], SHORT)[0] is run
-    runs = records()
-    assert all(a is b for a, b in zip(with_shorter_holds(runs, 2.0), runs, strict=True))
 
 
 @pytest.mark.slow

@@ -115,18 +115,6 @@ def test_the_network_is_called_in_when_constants_leave_structure():
     assert found.misfit < 0.5 * alone.misfit
 
 
-def test_functions_are_not_tried_where_constants_are_not_gone_on_from():
-    asked = []
-    found = trained(
-        problem_of("ptt_linear", {"epsilon": 0.4}),
-        goes_on=lambda law, misfit: asked.append((law, misfit)),
-    )
-    # asked once, of constants that leave structure: by default a network is called in, as above
-    assert asked == [(found.law, found.misfit)]
-    assert not found.varies
-    assert found.message.endswith("the residual still has structure")
-
-
 def test_units_come_in_through_modulus_and_relaxation_time(data):
     slow = [
         dataclasses.replace(

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.programs import compiled, compiler, in_threads, threads
+from discover.programs import compiled, compiler, in_threads
 from discover.programs.compiler import _compiled_soon, _whole_loops
 
 PIECES = compiler._PIECES

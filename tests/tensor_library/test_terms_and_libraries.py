@@ -94,7 +94,7 @@ SATURATING = "(tr(sigma)/(1+kappa*abs(tr(sigma))))*sigma"
 OF_DEGREE_ZERO = build_library(degree=0, closed_forms=("exp", "saturating"))
 FOUND = RecoveredTerm(
     EXPONENTIAL, 0.97, {"epsilon": 0.31}, (0.9, 1.04), coefficient_penalised=0.9, latex="h",
-    inner_ci95={"epsilon": (0.3, 0.32)}, inner_at_one={"epsilon": (0.3, 0.29, 0.31)},
+    inner_ci95={"epsilon": (0.3, 0.32)},
 )  # fmt: skip
 DECLARED = LawTerm("sigma.sigma", 0.2)
 

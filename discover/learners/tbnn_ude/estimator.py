@@ -2,21 +2,22 @@
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.forward.flow_batch import FlowBatch
 from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
 from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
@@ -25,6 +26,7 @@ from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingP
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
+from discover.protocols.kinematics import STATES
 from tensor_library import TENSOR_NAMES, TermLibrary, parse_term
 
 RECIPES = ("default", "thorough", "paper")
@@ -100,37 +102,17 @@ class TBNNUDE(RunPrediction):
     progress: Progress | None = None
     base: Fluid | None = None
 
-    def _learn(self, runs: list[Run], known: Fluid, shorten: bool = True) -> None:
+    def _learn(self, runs: list[Run], known: Fluid) -> None:
         started = time.perf_counter()
         recipe = self._recipe()
-        whole = held = problem = make_problem(runs, known)
-        followed, fitted = runs, ""
-        if isinstance(recipe, DefaultRecipe):
-            if shorten and known.law.linear_relaxation:
-                followed, problem = shorter_where_it_pays(
-                    runs,
-                    whole,
-                    lambda shorter: make_problem(shorter, known),
-                    np.asarray(known.relaxation_time),
-                    recipe.affordable,
-                )
-            held = problem
-            if work(problem) > recipe.affordable:
-                problem, fitted = _rougher(problem, followed, known, recipe.samples)
-            if work(whole) > recipe.affordable:
-                recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
+        problem, fitted = make_problem(runs, known), ""
+        if isinstance(recipe, DefaultRecipe) and work(problem) > recipe.affordable:
+            problem, fitted = _rougher(problem, runs, known, recipe.samples)
+            recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
         modes = replace(known, modulus_covariance=None)
 
-        def shortened(law: TensorBasisNetwork, misfit: float) -> str:
-            self.fluid_ = replace(modes, law=law)
-            recorded = self._predict_runs(runs), self._predict_runs(list(followed))
-            return shortened_rightly(whole, held, recorded, misfit)
-
-        def holds(law: TensorBasisNetwork, misfit: float) -> bool:
-            return followed is runs or bool(shortened(law, misfit))
-
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
-        trained, agreement = self._train_all(problem, keys, recipe, known, holds)
+        trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
         misfits = ensemble.member_misfits(members, problem)
         resolved, surprise = _resolved(recipe), None
@@ -144,10 +126,6 @@ class TBNNUDE(RunPrediction):
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
         self.ensemble_fluids_ = [replace(modes, law=law) for law in members]
-        shorter = "" if followed is runs else shortened(best.law, best.misfit)
-        if followed is not runs and not shorter:
-            self._learn(runs, known, shorten=False)
-            return
         self.fluid_ = replace(modes, law=best.law)
         cloud = sample_states(best.law, problem)
         library = self.projection_library or default_library()
@@ -175,7 +153,7 @@ class TBNNUDE(RunPrediction):
                     for law, misfit, fitting in zip(members, misfits, fits, strict=True)
                 ],
             },
-            message="; ".join(filter(None, (best.message, trained[0].left_out, fitted, shorter))),
+            message="; ".join(filter(None, (best.message, trained[0].left_out, fitted))),
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
 
@@ -194,13 +172,13 @@ class TBNNUDE(RunPrediction):
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
     def _train_all(
-        self, problem: TrainingProblem, keys, recipe, known: Fluid, goes_on
+        self, problem: TrainingProblem, keys, recipe, known: Fluid
     ) -> tuple[list[Trained], str]:
-        """Return all members, and how they came about; `goes_on`: as of `train_default`."""
+        """Return all members, and how they came about."""
         say = by_steps(self.progress)
 
         def member(key) -> Trained:
-            return self._train(problem, key, recipe, known, say, goes_on)
+            return self._train(problem, key, recipe, known, say)
 
         first = member(keys[0])
         if len(keys) == 1:
@@ -213,10 +191,10 @@ class TBNNUDE(RunPrediction):
         others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
-    def _train(self, problem: TrainingProblem, key, recipe, known: Fluid, say, goes_on) -> Trained:
+    def _train(self, problem: TrainingProblem, key, recipe, known: Fluid, say) -> Trained:
         relaxes, below = known.law.linear_relaxation, law_below(known)
         if isinstance(recipe, DefaultRecipe):
-            return train_default(problem, key, relaxes, recipe, say, below, goes_on)
+            return train_default(problem, key, relaxes, recipe, say, below)
         law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=below)
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
@@ -240,7 +218,7 @@ def _rougher(
     if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
         problem = make_problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
-    limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
+    limits = _rough_limits(problem.flows, np.asarray(known.relaxation_time))
     if limits is not None and known.law.linear_relaxation:
         rough = make_problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
@@ -248,6 +226,38 @@ def _rougher(
             problem = rough
             said.append(f"it was trained in {share:.2g} times fewer steps than it is tested in")
     return problem, ", and ".join(said)
+
+
+_STRAIN_STEP, _PHASE_STEP, _GROWTH = 0.4, 0.3, 0.1
+
+
+def _rough_limits(
+    flows: FlowBatch, relaxation_time: Float[np.ndarray, " k"]
+) -> Mapping[str, float] | None:
+    """Return limits of longer steps, as `make_grid` takes them; None where the flows have none.
+
+    Steps grow after a change of the rate up to a strain of one, and follow the fastest relaxation
+    where the fine grid does, else the slowest: over steps of many relaxation times a law that
+    relaxes faster than the known one diverges.
+    """
+    controls = {protocols.control for protocols, _ in flows.parts}
+    if not controls <= {"rate", *STATES}:
+        return None
+    if "rate" not in controls:
+        return {"strain_step": _STRAIN_STEP}
+    longest = max(
+        float(np.max(np.diff(grid.times, axis=1)))
+        for protocols, grid in flows.parts
+        if protocols.control == "rate"
+    )
+    times = np.asarray(relaxation_time)
+    followed = float(np.min(times) if longest <= np.min(times) else np.max(times))
+    return {
+        "strain_step": _STRAIN_STEP,
+        "phase_step": _PHASE_STEP,
+        "growth": _GROWTH,
+        "max_step": max(longest, followed),
+    }
 
 
 def _count_of_numbers(law: TensorBasisNetwork, varies: bool) -> int:

@@ -1,6 +1,6 @@
 """Recipes of training: the default, and that of the paper."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import equinox as eqx
@@ -41,14 +41,12 @@ def train_default(
     recipe: DefaultRecipe,
     progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
-    goes_on: Callable[[TensorBasisNetwork, float], bool] = lambda law, misfit: True,
 ) -> Trained:
     """Return a law trained by the default recipe.
 
     `key`: of the initial weights. `linear_relaxation`: whether −σ is known. `progress`: called
     after every step with step, largest number of steps and misfit. `base_law`: known law below the
-    network. `goes_on`: whether functions are worth their time beside a law of constants and its
-    misfit.
+    network.
     """
     session = Session(problem, recipe, progress)
     # beside a network that is zero the steps would be the same, at three times the work
@@ -60,8 +58,7 @@ def train_default(
         again = session.constants(thins)
         if session.misfit(again[1]) < session.misfit(law):
             penalised, law = again
-    ends = session.settled(law) or recipe.max_tensors == 0
-    if ends or not goes_on(law, session.misfit(law)):
+    if session.settled(law) or recipe.max_tensors == 0:
         return _finish(session, law, penalised, False, "constant coefficients")
     # the invariants as the data's own stresses have them, from the best law so far
     scale = invariant_sizes(session.cloud(law))

@@ -10,7 +10,6 @@ from discover.inference.engine.fits import Fit
 from discover.learners.results import RecoveredTerm
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.learners.tensor_sindy.search import SupportSearch
-from discover.statistics import HALF_BAND
 from discover.statistics.noise.noise_model import rms
 
 _CLOSE = 5.0
@@ -30,34 +29,18 @@ def recovered_terms(search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...
         term = search.library.terms[index]
         at, *inner_at = model.positions(term.name)
         inner = dict(zip(term.inner_names, inner_at, strict=True))
-        low, high = fit.interval(at)
-        may_be_one = low <= 1.0 <= high
         terms.append(
             RecoveredTerm(
                 term=term.name,
                 coefficient=float(fit.theta[at]),
                 coefficient_penalised=penalised.get(index),
-                ci95=(low, high),
+                ci95=fit.interval(at),
                 inner={name: float(fit.theta[own]) for name, own in inner.items()},
                 inner_ci95={name: fit.interval(own) for name, own in inner.items()},
-                inner_at_one={n: _at_one(fit, at, own) for n, own in inner.items() if may_be_one},
                 latex=term.latex(),
             )
         )
     return tuple(terms)
-
-
-def _at_one(fit: Fit, coefficient: int, position: int) -> tuple[float, float, float]:
-    """Return a constant and its 95 % interval, given that a coefficient is one."""
-    prior, covariance = fit.priors[position], fit.covariance
-    assert covariance is not None
-    own, place = fit.free.index(position), fit.free.index(coefficient)
-    # the normal distribution of the one, given the other
-    slope = covariance[own, place] / covariance[place, place]
-    middle = fit.coordinates[own] + slope * (1.0 - fit.theta[coefficient])
-    half = HALF_BAND * np.sqrt(max(covariance[own, own] - slope * covariance[own, place], 0.0))
-    low, high = (prior.to_value(np.clip(middle + s * half, *prior.ends)) for s in (-1.0, 1.0))
-    return prior.to_value(middle), low, high
 
 
 def covariance_of_terms(search: SupportSearch, fit: Fit) -> Float[np.ndarray, "p p"] | None:

@@ -66,9 +66,6 @@ SECTIONS: Mapping[tuple[str, str, str], Mapping[str, str]] = {
         "rivals": "The table of rivals",
     },
     ("next", "What to measure next", "What to measure next"): {"next": "The table of experiments"},
-    ("structure", "What these flows could tell of any law in the library", ""): {
-        "structure": "What the flows could tell"
-    },
     ("physics", "Are the laws physically sound?", "Soundness"): {
         "physics": "The checks of physical soundness"
     },

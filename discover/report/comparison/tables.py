@@ -166,8 +166,6 @@ def _inner(who: str, term: RecoveredTerm) -> Iterator[str]:
     for key, value in term.inner.items():
         ends = f" ({words.interval(term.inner_ci95[key])})" if key in term.inner_ci95 else ""
         yield f"{who}: {_equals(key, value)}{ends}"
-    for key, (value, *ends) in term.inner_at_one.items():
-        yield f"{who}, if the coefficient is one: {_equals(key, value)} ({words.interval(ends)})"
 
 
 def _equals(name: str, value: float) -> str:
