@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from discover.errors import InputError
 
@@ -65,7 +65,7 @@ class PageView:
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_HALF_95 = float(norm.ppf(0.975))
+_HALF_95 = float(ndtri(0.975))
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Estimate:
         """Return the interval of another probability: each side as far as a normal one's."""
         if self.ci95 is None:
             return None, None
-        share = float(norm.ppf(0.5 + 0.5 * level)) / _HALF_95
+        share = float(ndtri(0.5 + 0.5 * level)) / _HALF_95
         low, high = (self.value + share * (end - self.value) for end in self.ci95)
         return low, high
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from discover.answer import TOLERANCE, Discrepancy
 from discover.dataset import Dataset, Run
@@ -286,6 +285,8 @@ def _spread(
     model: AugmentedModel, free: Sequence[int], first: Theta, centre: Theta, reach: float
 ) -> list[Theta]:
     """Return vectors spread over a part of the ranges: all of them, or about a centre."""
+    from scipy.stats import qmc  # takes a while to load, and nothing else needs it
+
     spread = np.tile(first, (_TRIED, 1))
     shares = qmc.Sobol(len(free), scramble=False).random(_TRIED).T - 0.5
     for share, position in zip(shares, free, strict=True):

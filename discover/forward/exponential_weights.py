@@ -22,7 +22,7 @@ def phi_functions(z: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     of: Any = np if isinstance(z, np.ndarray) else jnp
     small = of.abs(z) < 1.0
     safe = of.where(small, 1.0, z)
-    first = of.expm1(safe) / safe
+    first = (of.exp(z) - 1.0) / safe
     second = (first - 1.0) / safe
     third = (second - 0.5) / safe
     near = of.where(small, z, 0.0)
@@ -231,4 +231,9 @@ def relax(
 ) -> Float[Array, "*levels"]:
     """Return s after a step of ds/dt = source − decay · s with both of them constant, exactly."""
     z = -decay * width
-    return state * jnp.exp(z) + source * width * phi_functions(z)[0]
+    grown, still = jnp.expm1(z), z == 0.0
+    return (
+        state
+        + grown * state
+        + source * width * jnp.where(still, 1.0, grown / jnp.where(still, 1.0, z))
+    )

@@ -7,11 +7,11 @@ the same coefficients for random ones, order by order, without rounding [Fliess 
 """
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cache, reduce
 from itertools import count, islice
-from operator import add
+from operator import add, mul
 from typing import Any, no_type_check
 
 from tensor_library import parse_term
@@ -89,39 +89,80 @@ UNKNOWN = "c"
 """A coefficient of a law that is solved for."""
 
 
+_PRIME = 2**61 - 1
+"""Modulo which two numbers that differ agree once in 10^18 times."""
+
+
+@no_type_check  # as above
+class _Series:
+    """Power series in time up to an order, over any ring, or of whole numbers modulo a prime."""
+
+    def __init__(self, values, modulus=None):
+        self.values = [value % modulus for value in values] if modulus else list(values)
+        self.modulus = modulus
+
+    def __add__(self, other):
+        return _Series(map(add, self.values, other.values), self.modulus)
+
+    def __mul__(self, other):
+        # what is of a higher order is not asked for
+        first, second = self.values, other.values
+        products = (sum(map(mul, first, second[k::-1])) for k in range(len(first)))
+        return _Series(products, self.modulus)
+
+    def __pow__(self, exponent):
+        return reduce(mul, [self] * exponent)
+
+
 def stress_series(
-    law: Mapping[str, Any], rate: Sequence[Fraction | int], linear_relaxation: bool = True
+    law: Mapping[str, Any],
+    rate: Sequence[Fraction | int],
+    linear_relaxation: bool = True,
+    modulus: int | None = None,
 ) -> Iterator[list[Any]]:
     """Yield the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, each dearer than the last.
 
     `law`: term → c of dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, without closed forms; c may be
-    `UNKNOWN`, in which what is yielded is a polynomial of SymPy. `rate`: of γ̇(t) = Σ rate[k] tᵏ.
+    `UNKNOWN`. `rate`: of γ̇(t) = Σ rate[k] tᵏ. `modulus`: a prime modulo which whole numbers are
+    yielded; else they are polynomials of SymPy in what is unknown.
     """
+    exact = _into_ring(modulus)
+    zero, one = exact(0), exact(1)
+    terms = [(exact(value), parse_term(name)) for name, value in law.items() if value]
+    rates: list[Any] = []
+    stress: list[list[Any]] = [[zero] for _ in range(4)]
+    for k in count():
+        now = [_Series(component, modulus) for component in stress]
+        yield [component.values[k] for component in now]
+        rates.append(exact(rate[k] if k < len(rate) else 0))
+        given = rates, [one] + k * [zero], (k + 1) * [zero]
+        shear_rate, *units = (_Series(values, modulus) for values in given)
+        notation = ExactNotation(now, shear_rate, *units)
+        stretched, turned = ((shear_rate * now[at]).values[k] for at in (3, 1))
+        slope = [2 * stretched, zero, zero, rates[k] + turned]
+        if linear_relaxation:
+            slope = [value - old.values[k] for value, old in zip(slope, now, strict=True)]
+        for c, term in terms:
+            pairs = zip(slope, term.spell(notation), strict=True)
+            slope = [value - c * component.values[k] for value, component in pairs]
+        for component, value in zip(stress, slope, strict=True):
+            component.append(value * exact(Fraction(1, k + 1)))
+
+
+def _into_ring(modulus: int | None) -> Callable[[Any], Any]:
+    """Return what makes a rational number one of the ring of `stress_series`."""
+    if modulus is not None:
+        return lambda value: value.numerator * pow(value.denominator, -1, modulus) % modulus
     from sympy import QQ, ring
 
-    series, t, unknown = ring(f"t,{UNKNOWN}", QQ)
+    polynomials, unknown = ring(UNKNOWN, QQ)
 
     def exact(value: Any) -> Any:
-        return unknown if value == UNKNOWN else QQ(*Fraction(value).as_integer_ratio())
+        if value == UNKNOWN:
+            return unknown
+        return polynomials(QQ(*Fraction(value).as_integer_ratio()))
 
-    def coefficient(value: Any, k: int) -> Any:
-        return series.from_dict({(0, c): each for (power, c), each in value.items() if power == k})
-
-    terms = [(exact(value), parse_term(name)) for name, value in law.items()]
-    shear_rate, stress = series.zero, [series.zero] * 4
-    for k in count():
-        yield [coefficient(component, k) for component in stress]
-        shear_rate += exact(rate[k] if k < len(rate) else 0) * t**k
-        notation = ExactNotation(stress, shear_rate, series.one, series.zero)
-        grown = 2 * shear_rate * stress[3], shear_rate + shear_rate * stress[1]
-        slope = [grown[0], series.zero, series.zero, grown[1]]
-        if linear_relaxation:
-            slope = [value - old for value, old in zip(slope, stress, strict=True)]
-        for c, term in terms:
-            components = term.spell(notation)
-            slope = [value - c * one for value, one in zip(slope, components, strict=True)]
-        further = (coefficient(value, k) * t ** (k + 1) * QQ(1, k + 1) for value in slope)
-        stress = [old + new for old, new in zip(stress, further, strict=True)]
+    return exact
 
 
 def same_shear_stress(
@@ -134,7 +175,7 @@ def same_shear_stress(
     generator = random.Random(2)
     for _ in range(_HISTORIES):
         rate = [Fraction(generator.randint(-9, 9), generator.randint(1, 9)) for _ in range(order)]
-        both = (stress_series(law, rate, linear_relaxation) for law in (first, second))
+        both = (stress_series(law, rate, linear_relaxation, _PRIME) for law in (first, second))
         if any(a[3] != b[3] for a, b in islice(zip(*both, strict=True), order + 1)):
             return False
     return True
@@ -165,7 +206,7 @@ def solve_for_coefficient(
             if excess:
                 return []
             continue
-        polynomial = Poly({(c,): value for (_, c), value in excess.items()}, Symbol(UNKNOWN))
+        polynomial = Poly({(c,): value for (c,), value in excess.items()}, Symbol(UNKNOWN))
         candidates = []
         roots: set[Any] = set(polynomial.real_roots())
         for root in sorted(roots, key=lambda one: abs(float(one))):

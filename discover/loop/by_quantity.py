@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
@@ -51,7 +51,7 @@ def with_unseen(result: Any) -> Discrepancy | None:
     if not found.size or size is None:
         return found
     # of few runs the size is uncertain, as that of normal misses is
-    ends = np.sqrt(count / chi2.ppf((0.975, 0.025), count)) if count > 1 else np.ones(2)
+    ends = np.sqrt(count / chdtri(count, (0.025, 0.975))) if count > 1 else np.ones(2)
     return replace(
         found,
         size=size,

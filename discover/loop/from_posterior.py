@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from discover.dataset import Run
 from discover.effects import AbstractEffect
@@ -138,7 +138,7 @@ class Ended(Path):
         if len(missed) < FEWEST_RUNS:
             return asdict(size)
         mean = float(np.mean(missed))
-        ends = np.sqrt(len(missed) / chi2.ppf((0.975, 0.025), len(missed)))
+        ends = np.sqrt(len(missed) / chdtri(len(missed), (0.025, 0.975)))
         low, high = (float(end) * mean for end in ends)
         return asdict(replace(size, size=mean, ci95=(low, high), by_run=self.left_out))
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from discover.dataset.checking.runs import Finding, found, is_start_up, steady_stress, stress_noise
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
@@ -303,7 +303,7 @@ def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
     weights = errors**-2.0
     off = (gains - np.sum(weights * gains) / np.sum(weights)) / errors
     spread = float(np.sqrt(max(np.var(gains, ddof=1) - np.mean(errors**2), 0.0)))
-    if chi2.sf(float(off @ off), len(gains) - 1) > _UNLIKELY or spread > LARGEST:
+    if chdtrc(len(gains) - 1, float(off @ off)) > _UNLIKELY or spread > LARGEST:
         return
     ends = {"low": np.exp(np.min(gains)), "high": np.exp(np.max(gains))}
     yield found("loadings", **ends, percent=percent_of(spread), spread=spread)

@@ -4,6 +4,7 @@
 end.
 """
 
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ class Kernel(Code):
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
+        self._weights = (self._kinds, WEIGHTS) if self._kinds > 1 else (WEIGHTS,)
         self._make(fluid, found, flow)
 
     def __call__(
@@ -79,7 +81,7 @@ class Kernel(Code):
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * self.size
         # the state stands there twice: as it was before a piece, too
-        room = _STATE + 2 * (size - _STATE)
+        room = _STATE + 2 * (size - _STATE) + modes * self._kinds * WEIGHTS
         room += Cycles.room(self._state_at - _LEVELS, modes, self.size)
         scratch = np.empty((room, LANES))
         arrays = given | {
@@ -96,8 +98,11 @@ class Kernel(Code):
         self._parameters = self._shared.tree(first)
         self._on = self._truths()
         self._moves = w.builder.alloca(INTEGER)
-        self._numbers = w.at((w.counts["modes"], self.size), (self._state_at - _STATE, 1))
-        room, has_states = w.at((self._numbers, 2), (_STATE, 1)), self._on["states"]
+        modes = w.counts["modes"]
+        self._numbers = w.at((modes, self.size), (self._state_at - _STATE, 1))
+        self._weights_at = w.at((self._numbers, 2), (_STATE, 1))
+        room = w.at((self._weights_at, 1), (modes, self._kinds * WEIGHTS))
+        has_states = self._on["states"]
         self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
         with w.loop(w.counts["runs"]) as run, self._arithmetic.apart():
             self._of_run(run)
@@ -157,6 +162,8 @@ class Kernel(Code):
         several = b.icmp_signed(">", count, INTEGER(1))
         changes = a.in_some(a.compare("!=", rates[0], rates[2]))
         may_end = b.and_(b.icmp_signed(">=", count, INTEGER(FEWEST)), b.not_(changes))
+        with b.if_then(b.not_(self._on["times"])), a.apart():
+            self._weigh(width)
         self._keep(0.0, _BEGIN)
         b.store(INTEGER(1), self._moves)
 
@@ -206,18 +213,21 @@ class Kernel(Code):
         w, a = self._w, self._arithmetic
         self._keep(0.0, _MOVED)
 
-        def seen(place: Any, scale: Any) -> None:
-            now, before = self._kept(place), self._kept(w.at((place, 1), (self._numbers, 1)))
-            moved = a.divide(a.size(a.subtract(now, before)), scale)
+        def seen(first: Any, count: int, scale: Any) -> None:
+            now, before = (
+                self._kept(place, count) for place in (first, w.at((first, 1), (self._numbers, 1)))
+            )
+            sizes = [a.size(a.subtract(*pair)) for pair in zip(now, before, strict=True)]
+            moved = a.divide(reduce(a.larger, sizes), scale)
             self._keep(a.larger(self._kept(_MOVED), moved), _MOVED)
 
         for place in range(_LEVELS, self._state_at):
-            seen(place, a.add(a.size(self._kept(place)), _SMALL_STATE))
+            seen(place, 1, a.add(a.size(self._kept(place)), _SMALL_STATE))
         with w.loop(w.counts["modes"]) as number, a.apart():
             at = self._place_of_mode(number)
-            sheared = a.add(a.size(self._kept(w.at((at, 1), (3, 1)))), _SMALL)
-            for i in range(self.size):
-                seen(w.at((at, 1), (i, 1)), sheared if i < 4 else 1.0)
+            seen(at, 4, a.add(a.size(self._kept(w.at((at, 1), (3, 1)))), _SMALL))
+            if self.size > 4:
+                seen(w.at((at, 1), (4, 1)), self.size - 4, 1.0)
         return self._kept(_MOVED)
 
     def _of_step(self, run, number, flow, rates, width) -> None:
@@ -228,13 +238,15 @@ class Kernel(Code):
         before, scale_last, slow = write(
             step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width
         )
+        with w.builder.if_then(on["times"]), self._arithmetic.apart():
+            self._weigh(self._arithmetic.divide(width, slow[1]))
         if self._series:
             with w.builder.if_then(on["series"]), self._arithmetic.apart():
                 self._foresee(run, number, flow, width, slow, rates, before, scale_last)
         taken = self._kept(_TAKEN)
         self._keep(np.zeros(2), _SUM)
         with w.loop(counts["modes"]) as mode_number, self._arithmetic.apart():
-            mode, weights, stress, at = self._mode(run, number, mode_number, width, slow)
+            mode, weights, stress, at = self._mode(run, number, mode_number)
             after = write(
                 step.of_mode,
                 shared, mode, on, flow, slow, stress, tuple(rates), taken, earlier, weights,
@@ -271,7 +283,7 @@ class Kernel(Code):
         sums = (_SUM, _OTHER_SUM)
         self._keep(np.zeros(2), _SUM)
         with w.loop(w.counts["modes"]) as mode_number, self._arithmetic.apart():
-            mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow)
+            mode, weights, stress, _ = self._mode(run, number, mode_number)
             rate = add(rates[0], earlier)
             found = write(step.foreseen, shared, mode, on, flow, slow, stress, rate, weights)
             for place, value in zip(sums, found, strict=True):
@@ -283,21 +295,41 @@ class Kernel(Code):
         )  # fmt: skip
         self._keep(taken[()], _TAKEN)
 
-    def _mode(self, run, number, mode_number, width, slow):
+    def _weigh(self, width) -> None:
+        """Write the weights of a step of each mode of its own: of one length in the mode's time.
+
+        All pieces of a step have the same, but where states change the times.
+        """
+        w, apart = self._w, self._arithmetic.apart
+        with (
+            w.loop(w.counts["modes"]) as number, w.builder.if_then(self._is_own(number)), apart(),
+        ):  # fmt: skip
+            mode, on = self._tree("mode", self._of_mode, number), {"own weights": True}
+            weights = self._write(self._step.weights, mode, on, width, np.zeros(WEIGHTS))
+            self._keep(weights, self._place_of_weights(number))
+
+    def _is_own(self, number) -> Any:
+        """Return whether the weights of a mode are its own, and not those of the table."""
+        b = self._w.builder
+        untabled = b.icmp_signed(">=", number, self._w.counts["tabled"])
+        return b.or_(self._on["own weights"], untabled)
+
+    def _place_of_weights(self, number) -> Any:
+        return self._w.at((number, self._kinds * WEIGHTS), (self._weights_at, 1))
+
+    def _mode(self, run, number, mode_number):
         """Return a mode, the weights of its step, its stress and where that is kept."""
-        w, builder, counts = self._w, self._w.builder, self._w.counts
-        mode = self._tree("mode", self._of_mode, mode_number)
-        untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
-        own = builder.or_(self._on["own weights"], untabled)
-        # past the table's end its first row is read, and not used
-        row = builder.select(untabled, INTEGER(0), mode_number)
-        tabled = w.at((run, counts["steps"]), (number, 1))
-        tabled = w.at((tabled, w.at((counts["tabled"], WEIGHTS))), (row, WEIGHTS))
-        table = [self._splat("table", w.at((tabled, 1), (i, 1))) for i in range(WEIGHTS)]
-        width = self._arithmetic.divide(width, slow[1])
-        on = {"own weights": own}
-        weights = self._write(self._step.weights, mode, on, width, _array(table))
-        at = self._place_of_mode(mode_number)
+        w, a, counts = self._w, self._arithmetic, self._w.counts
+        mode, at = self._tree("mode", self._of_mode, mode_number), self._place_of_mode(mode_number)
+        weights = self._kept(self._place_of_weights(mode_number), *self._weights)
+        if self._kinds == 1:
+            own = self._is_own(mode_number)
+            # past the table's end its first row is read, and not used
+            row = w.builder.select(own, INTEGER(0), mode_number)
+            tabled = w.at((run, counts["steps"]), (number, 1))
+            tabled = w.at((tabled, w.at((counts["tabled"], WEIGHTS))), (row, WEIGHTS))
+            table = [self._splat("table", w.at((tabled, 1), (i, 1))) for i in range(WEIGHTS)]
+            weights = _array([a.chosen(own, *pair) for pair in zip(weights, table, strict=True)])
         return mode, weights, self._kept(at, self.size), at
 
     def _record(self, run, number, is_run) -> None:

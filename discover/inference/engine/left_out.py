@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
-from scipy.stats import t as student
+from scipy.special import logsumexp, stdtrit
 
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.priors import Priors
@@ -117,5 +116,5 @@ def of_the_next_run(runs: int) -> float:
 
     As few runs tell a deviation badly, Student's quantile is the wider.
     """
-    wider = student.ppf(0.975, max(runs - 1, 1)) / HALF_BAND
+    wider = stdtrit(max(runs - 1, 1), 0.975) / HALF_BAND
     return float(wider * np.sqrt(1.0 + 1.0 / runs))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.linear_errors import LinearErrors
@@ -228,4 +228,4 @@ def _nearest(
             misfit = float(np.sum((target - own * amount) ** 2))
             if misfit < least:
                 best, least = (name, float(inner), amount), misfit
-    return best[0] if least < chi2.ppf(_USUAL, len(x) - 2) else None, best
+    return best[0] if least < chdtri(len(x) - 2, 1.0 - _USUAL) else None, best

@@ -9,8 +9,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 from scipy.fft import dct
-from scipy.signal import lfilter
-from scipy.stats import gamma
+from scipy.special import gammaincc
 
 from discover.statistics.noise.noise_model import rms
 
@@ -53,7 +52,10 @@ def _redrawn(
     for row in rows:
         new = row - rho * np.append(0.0, row[:-1])
         signs = generator.choice([-1.0, 1.0], (_DRAWS, len(row)))
-        drawn.append(np.asarray(lfilter([1.0], [1.0, -rho], signs * new)))
+        one = signs * new
+        for i in range(1, len(row)):
+            one[:, i] += rho * one[:, i - 1]
+        drawn.append(one)
     return drawn
 
 
@@ -62,7 +64,7 @@ def _exceeded(value: float, by_chance: Float[np.ndarray, " draws"]) -> float:
     mean, variance = float(np.mean(by_chance)), float(np.var(by_chance))
     if variance <= 0.0:
         return 1.0
-    return float(gamma.sf(value, mean**2 / variance, scale=variance / mean))
+    return float(gammaincc(mean**2 / variance, value * mean / variance))
 
 
 def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):
