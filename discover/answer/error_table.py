@@ -47,7 +47,7 @@ def errors(answer: Any) -> list[Errors]:
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         near, far = ("" if value is None else at_most(value) for value in one.spread)
-        if one.is_measured and (one.inside is not None or (one.is_known and not far)):
+        if one.inside is not None or (one.is_known and not far):
             beyond, at = "not measured", ""
             if one.beyond is not None and not far:
                 beyond, at = at_most(one.beyond), one.beyond_at
