@@ -58,7 +58,8 @@ def _law(answer: Any, most: int) -> str:
     several = len(answer.modes) > 1
     own = [
         one for one in answer.constants
-        if not (several and one.name in _OF_MODES) and not (answer.is_empirical and one.is_term)
+        if not (several and (one.name in _OF_MODES or one.letter.endswith("_+")))
+        and not (answer.is_empirical and one.is_term)
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
     certain = [one for one in own if not one.is_poor]

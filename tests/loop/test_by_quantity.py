@@ -367,6 +367,16 @@ def test_an_oscillation_has_an_amplitude_states_are_steady_and_linear_runs_no_de
     assert shows_a_derivative(result([*FITTED, normal], spread_of_laws={"N1": apart}))
 
 
+def test_runs_at_two_temperatures_that_nobody_shifted_are_to_be_fitted_apart():
+    hot, cold = (
+        replace(one, temperature_C=at) for one, at in zip(FITTED[:2], (160.0, 140.0), strict=True)
+    )
+    found = result([hot, cold])
+    assert what_to_measure_next(found).startswith("Fit the runs of one temperature")
+    found.records = [hot, replace(cold, temperature_C=160.0)]
+    assert not what_to_measure_next(found).startswith("Fit the runs of one temperature")
+
+
 def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():
     time = np.linspace(0.0, 60.0, 601)
     # measured while it falls from the rate before

@@ -334,6 +334,9 @@ def test_a_constant_that_differs_from_mode_to_mode_is_a_range_over_them():
     assert heads == ["mode", "G (Pa)", "λ (s)", "ε_k"]
     assert rows == [["1", "1000", "1", "(1.8)"], ["2", "100", "10", "0.12"]]
     added = Constant("relaxation_mode.G", 100.0, (30.0, 300.0), "Pa", letter="G_+")
+    slow = replace(added, name="relaxation_mode.lambda", unit="s", letter=r"\lambda_+")
+    linear = replace(MELT, title="linear viscoelastic", constants=(added, slow))
+    assert linear.headline.startswith("Linear viscoelastic, 2 modes.")  # one alone is no spectrum
     fit = replace(fit, constants=(added,))
     assert "1 constant (1 poorly determined), 2 modes." in fit.headline
     assert origin(fit) == " (1 given, 1 added)"

@@ -132,9 +132,8 @@ def integrated_rate(run: Run) -> Float[np.ndarray, " n"]:
     A step of strain before the record counts; a flow that had gone on does not.
     """
     time, rate = np.asarray(run.time), np.asarray(run.rate)
-    is_step = not (run.from_rest or run.rate_before or np.any(run.protocol.cycle))
     begins = np.array([float(run.protocol.begins)])
-    step = -float(strains(run.protocol, begins)[0]) if is_step else 0.0
+    step = -float(strains(run.protocol, begins)[0]) if run.after_step else 0.0
     return step + rate[0] * time[0] + cumulative_trapezoid(rate, time, initial=0.0)
 
 
