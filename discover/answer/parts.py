@@ -114,7 +114,6 @@ class ExpectedError:
     beyond_at: str = ""
     missing: Literal["not measured", "not determined", "measured but not used"] = "not measured"
     note: str = ""
-    is_measured: bool = True  # whether records of this quantity tell it, or only the law does
     is_residual: bool = False  # of fitted runs, which is no error to expect
     spread: tuple[float | None, float | None] = (None, None)
     uncorrected: str = ""  # what of the instrument its records are not corrected for

@@ -61,7 +61,8 @@ def _law(answer: Any, most: int) -> str:
     several = len(answer.modes) > 1
     own = [
         one for one in answer.constants
-        if not (several and one.name in _OF_MODES) and not (answer.is_empirical and one.is_term)
+        if not (several and (one.name in _OF_MODES or one.letter.endswith("_+")))
+        and not (answer.is_empirical and one.is_term)
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
     certain = [one for one in own if not one.is_poor]
@@ -157,7 +158,7 @@ def description(answer: Any, brief: int = 0) -> str:
 
 def _unseen(answer: Any) -> dict[str, Any]:
     """Return errors of what was measured and not fitted, by symbol."""
-    each = {s: answer.expected(n) for n, s in SYMBOLS.items() if answer.expected(n).is_measured}
+    each = {symbol: answer.expected(name) for name, symbol in SYMBOLS.items()}
     return {s: one for s, one in each.items() if one.inside is not None and not one.is_residual}
 
 
@@ -244,7 +245,7 @@ def usable(answer: Any) -> tuple[list[str], str]:
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         fitted = ("shear" if name == "sigma12" else name) in flows
-        if one.is_measured and (fitted if one.inside is None else one.inside <= _USELESS):
+        if fitted if one.inside is None else one.inside <= _USELESS:
             states = name == "sigma12" and answer.range.steady
             tested.append("steady shear stress" if states else symbol)
     for name in ("N1", "uniaxial"):

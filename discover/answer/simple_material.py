@@ -71,7 +71,8 @@ class SimpleMaterial:
 
     def predict(self, run: Run) -> Float[np.ndarray, " n"] | None:
         """Return what it records in a run; None in a flow that it does not describe."""
-        known = self.kind != "solid" or run.from_rest  # the strain since rest
+        # the strain since rest, which creep records
+        known = self.kind != "solid" or run.from_rest or run.protocol.control == "stress"
         if not known or not describes(run.protocol.control, run):
             return None
         return recorded(self.law, self._values, run)

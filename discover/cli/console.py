@@ -273,7 +273,5 @@ JsonOption = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 OverwriteOption = Annotated[bool, Option("--overwrite", help="Start again instead of resuming.")]
 ToleranceOption = Annotated[
     float | None,
-    Option(
-        min=0.0, max=1.0, help="Relative misfit that you accept; default: the study's, or 0.05."
-    ),
+    Option(help="Relative misfit that you accept; default: the study's, or 0.05."),
 ]

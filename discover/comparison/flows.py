@@ -9,6 +9,7 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
 from discover import protocols
+from discover.dataset import Dataset
 from discover.dataset.material_functions import as_compared
 from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
 from discover.dataset.run import Run
@@ -201,10 +202,18 @@ def comparison_flows(
     """Return the flows of a comparison: training, held out, and, with a known law, tests.
 
     `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi and De of oscillations over which
-    errors are mapped.
+    errors are mapped. N1 and N2 that are fitted or tested as σ12 of their run is are in its flow.
     """
-    flows = [run_flow(run, "training", data) for run in data.fit]
-    flows += [run_flow(run, "held_out", data) for run in data.held_out]
+    sound = {run.name: run for run in data.dataset.quantity_by_quantity()}
+    flows = []
+    parts: tuple[tuple[FlowKind, Dataset], ...] = (
+        ("training", data.fit), ("held_out", data.held_out)
+    )  # fmt: skip
+    for kind, part in parts:
+        normal = {one.name for run in part for one in _beside(run)}
+        other = {run.name for _, runs in parts if runs is not part for run in runs}
+        known = {name: run for name, run in sound.items() if name not in other}
+        flows += [run_flow(run, kind, data, known) for run in part if run.name not in normal]
     truth = data.truth
     if truth is None:
         return flows
@@ -232,19 +241,27 @@ def _late_cycle(deborah: float, samples: int = 121) -> Float[np.ndarray, " n"]:
     return np.concatenate([[0.0], start + np.linspace(0.0, period, samples)])
 
 
-def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
-    """Return the flow of a run of the data set."""
+def _beside(run: Run) -> list[Run]:
+    """Return N1 and N2 that a run recorded, as records of their own."""
+    return [run.observing(quantity) for quantity in run.beside]
+
+
+def run_flow(run: Run, kind: FlowKind, data: StudyData, sound: Mapping[str, Run]) -> Flow:
+    """Return the flow of a run of the data set.
+
+    `sound`: records by name; what of N1 and N2 is not among them is not compared, and nan.
+    """
     dataset = data.dataset
     exact = dataset.exact if isinstance(dataset, SyntheticDataset) else None
     if exact is not None:
         reference = columns_of(recorded_and_normal(run.protocol, exact[run.name].components))
     else:
-        candidates = {
-            "sigma12": run.recorded,  # in extension the tensile stress, in creep the strain
-            "N1": run.first_normal_stress_difference,
-            "N2": run.second_normal_stress_difference,
-        }
-        reference = {key: value for key, value in candidates.items() if value is not None}
+        # in extension the tensile stress, in creep the strain
+        reference: dict[str, np.ndarray] = {"sigma12": run.recorded}
+        for own in _beside(run):
+            if own.name in sound:
+                there = np.isin(own.time, sound[own.name].time)
+                reference[own.quantity] = np.where(there, own.recorded, np.nan)
     of_states = run.protocol.control in STATES
     return Flow(
         run.name, kind, run.protocol, run.time, run.rate, reference,
@@ -287,9 +304,10 @@ def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[st
         scale = reference.get("N1" if quantity == "N2" else quantity)
         if quantity not in reference or scale is None:
             continue
-        norm = float(np.linalg.norm(scale))
+        told = np.isfinite(scale) & np.isfinite(reference[quantity])
+        norm = float(np.linalg.norm(scale[told]))
         if norm > 0:
-            difference = np.linalg.norm(prediction[quantity] - reference[quantity])
+            difference = np.linalg.norm((prediction[quantity] - reference[quantity])[told])
             errors[quantity] = float(difference / norm)
     return errors
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from discover.comparison.flows import (
     MEASURED,
@@ -60,10 +61,12 @@ class Frame:
                 bands[flow.key] = Band(*ends)  # pyright: ignore[reportArgumentType]
         return replace(own, predictions=predictions, bands=bands)
 
-    def alone(self) -> dict[str, Stresses | None]:
-        """Return what the known part alone predicts, by the key of the flow."""
-        found = simulated(self.model.fluid, self.flows)
-        return {flow.key: self.recorded(flow, found[flow.key]) for flow in self.flows}
+    def of_declared(self, declared: StudyModel, ended: Ended) -> dict[str, Stresses | None]:
+        """Return what the declared model predicts as fitted alone, by the key of the flow."""
+        model = _as_fitted(declared, ended, ended.declared_theta)
+        _, added = without_instrument(self.data, ended, model.effects, ended.declared_theta)
+        found, own = simulated(model.fluid, self.flows)[0], replace(self, added=added)
+        return {flow.key: own.recorded(flow, found[flow.key]) for flow in self.flows}
 
 
 def known_part(
@@ -79,25 +82,25 @@ def known_part(
     InputError if learners cannot be given a declared effect.
     """
     data = _dated(ended, data)
-    model = _as_fitted(declared, ended)
+    model = _as_fitted(declared, ended, ended.theta)
     known = tuple(model.effects)
     found = known if ended.verdict != "effects_added" else (*known, *_found(ended))
     try:
-        without, added = without_instrument(data, ended, found)
+        without, added = without_instrument(data, ended, found, ended.fit.theta)
     except InputError:  # the runs are of another kind
         found = known
-        without, added = without_instrument(data, ended, known)
+        without, added = without_instrument(data, ended, known, ended.fit.theta)
     flows = comparison_flows(data, high_deborah, pipkin)
     return Frame(replace(model, effects=()), without, flows, added, found)
 
 
-def _as_fitted(declared: StudyModel, ended: Ended) -> StudyModel:
-    """Return the declared model with numbers for what was fitted.
+def _as_fitted(declared: StudyModel, ended: Ended, theta: Float[np.ndarray, " p"]) -> StudyModel:
+    """Return the declared model with numbers for what was fitted, `theta`.
 
     Its effects of the fluid are in its law, modes and solvent then, and the others are of the
     instrument. Raises InputError if learners cannot take an effect.
     """
-    model, theta = ended.posterior.problem.model, ended.theta
+    model = ended.posterior.problem.model
     effects = (
         replace(known, values=tuple(map(float, theta[model.positions(known.name)])))
         if known.free
@@ -179,17 +182,18 @@ _NORMAL = ("first_normal_stress_difference", "second_normal_stress_difference")
 
 
 def without_instrument(
-    data: StudyData, ended: Ended, effects: Sequence[KnownEffect]
+    data: StudyData, ended: Ended, effects: Sequence[KnownEffect], theta: Float[np.ndarray, " p"]
 ) -> tuple[StudyData, Mapping[str, Stresses]]:
     """Return data without what the instrument did to them, and what that is, by name of the run.
 
-    What effects did is by how much they change what the likeliest hypothesis records. So where that
-    misses a run by 5 % and a gain is 10 %, the record is corrected to 0.5 %; and a motor or a
-    transducer with a memory is taken out as well as a gain. Runs in extension, which another
-    instrument makes, stay as they are.
+    What effects did is by how much they change what a hypothesis records. So where that misses a
+    run by 5 % and a gain is 10 %, the record is corrected to 0.5 %; and a motor or a transducer
+    with a memory is taken out as well as a gain. Runs in extension, which another instrument makes,
+    stay as they are.
 
-    `data`: as recorded. `effects`: of the instrument, with their values. Raises InputError if an
-    effect acts on a measured rate that contains it, or a run is not at a given rate in time.
+    `data`: as recorded. `effects`: of the instrument, with their values. `theta`: constants of the
+    hypothesis. Raises InputError if an effect acts on a measured rate that contains it, or a run is
+    not at a given rate in time.
     """
     require_possible(effects, data.dataset.runs)
     other = next((run for run in data.dataset if run.protocol.control != "rate"), None)
@@ -203,7 +207,7 @@ def without_instrument(
             f"time, and {other.name} is none. Leave it out of [data], leave the effects out, or "
             "use discover close-loop."
         )
-    model, with_it = ended.posterior.problem.model, ended.fit.theta.copy()
+    model, with_it = ended.posterior.problem.model, theta.copy()
     without = with_it.copy()
     for known in effects:
         with_it[model.positions(known.name)] = known.values

@@ -164,7 +164,7 @@ def compare(
         data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
         known_part=known_in_words(declared, frame, study),
         flows=frame.flows,
-        before=frame.alone(),
+        before=frame.of_declared(declared, found.ended()),
         outcomes=outcomes,
         posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},

@@ -260,6 +260,11 @@ class Run(NotebookView):
         return float(self.protocol.begins) == 0.0
 
     @property
+    def after_step(self) -> bool:
+        """Whether a step of strain came before the record."""
+        return not (self.from_rest or self.rate_before or np.any(self.protocol.cycle))
+
+    @property
     def flows(self) -> bool:
         """Whether anything flows in the run, or did just before it."""
         return not self.from_rest or bool(np.max(np.abs(self.rate)) > SLOWEST_RATE)

@@ -31,7 +31,8 @@ Kind = Literal["constitutive", "kinematic", "signal"]
 
 Scale = Literal[
     "one", "sampling_time", "run_time", "inverse_rate", "strain", "stress", "inverse_stress",
-    "fluidity", "viscosity", "stress_rate", "rate", "inertia", "softening_by_heat", "shift_factor",
+    "compliance", "fluidity", "viscosity", "stress_rate", "rate", "inertia", "softening_by_heat",
+    "shift_factor",
 ]  # fmt: skip
 """What sets the natural size of a parameter: a property of the data, or nothing (``one``)."""
 

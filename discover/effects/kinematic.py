@@ -176,7 +176,7 @@ TOOL_COMPLIANCE = ToolCompliance(
     name="tool_compliance",
     parameters=(
         EffectParameter(
-            "compliance", "C", "1/Pa", low=0.0, high=0.1, scale="inverse_stress", first_trial=0.01,
+            "compliance", "C", "1/Pa", low=0.0, high=0.1, scale="compliance", first_trial=0.01,
             range_source="πR⁴/(2 H K) of a torsion bar as soft as K = 0.1 N m/rad with R = 50 mm, "
             "H = 1 mm; other transducers are 1000 times as stiff (Gottlieb & Macosko 1982)",
         ),

@@ -193,6 +193,7 @@ def data_scales(runs: Sequence[Run], others: Sequence[Run] = ()) -> dict[str, fl
     strains = [
         float(np.sum(np.abs(run.rate[1:]) * np.diff(run.time)))
         + abs(float(run.rate[0])) * float(run.time[0])
+        + (0.0 if run.strain is None else abs(float(run.strain[0])))
         for run in timed
     ]
     strains += [float(np.max(np.abs(run.strain))) for run in sweeps if run.strain is not None]
@@ -205,13 +206,15 @@ def data_scales(runs: Sequence[Run], others: Sequence[Run] = ()) -> dict[str, fl
     rates = [float(np.max(np.abs(run.rate))) for run in runs]
     stress, gap = float(np.median(stresses)) or 1.0, float(np.median(gaps or [1.0]))
     rate, length = float(np.median(rates)) or 1.0, float(np.median(lengths)) or 1.0
+    strain = float(np.median(strains)) or 1.0
     return {
         "sampling_time": gap,
         "run_time": float(np.median(material_lengths)) or 1.0,
         "inverse_rate": 1.0 / rate,
-        "strain": float(np.median(strains)) or 1.0,
+        "strain": strain,
         "stress": stress,
         "inverse_stress": 1.0 / stress,
+        "compliance": min(1.0, strain) / stress,  # that of a tool does not depend on the strain
         "fluidity": rate / stress,
         "viscosity": stress / rate,
         "stress_rate": stress / length,

@@ -299,9 +299,9 @@ def oil_twin(
 
     The rate behind a motor follows the commanded one, t_m dγ̇ₘ/dt + γ̇ₘ = γ̇, so that η γ̇ₘ is the
     stress of a mode with λ = t_m and G = η/t_m. An inertia I adds I dγ̇ₘ/dt = (I/t_m) (γ̇ − γ̇ₘ),
-    which is that of a solvent beside a smaller mode. None where N1, extension or a rate measured at
-    the tool tells the two apart, and where no motor is that slow. All in units of Pa and s;
-    `solvent`: the viscosity beside the mode.
+    which is that of a solvent beside a smaller mode. None where N1, extension, a step of strain
+    before the record or a rate measured at the tool tells the two apart, and where no motor is that
+    slow. All in units of Pa and s; `solvent`: the viscosity beside the mode.
     """
     found = {"viscosity": modulus * time + solvent, "rise_time": time, "inertia": solvent * time}
     rise, inertia = (
@@ -310,6 +310,7 @@ def oil_twin(
     told = any(
         (run.flow, run.quantity, run.protocol.control) != ("shear", "sigma12", "rate")
         or run.rate_is_measured
+        or run.after_step
         for run in runs
     )
     return None if told or time > rise.high or solvent * time > inertia.high else found

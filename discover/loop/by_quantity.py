@@ -121,15 +121,14 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
 def _by_law(result: Any, kind: str) -> ExpectedError:
     """Return what is known of a stress that nothing measured: by how much equally good laws differ.
 
-    A number where they agree in N1; N2 is that of the law, unless they differ.
+    No number is an error of what nothing tested. N2 is that of the law, unless they differ.
     """
     apart, limit = differing(result, kind), _WORTH_SAYING if kind == "N2" else _APART
     ends = _spread(result, kind)
     there = kind == "N1" and any(record.has_normal_stress for record in result.records)
     unused = "measured but not used" if there else None  # no sample of it is sound
-    if kind == "N1" and normal_stress_settled(result):
-        return ExpectedError(*ends, note=unused or "", is_measured=False, spread=ends)
-    if apart is not None and (apart >= limit or kind == "N1"):
+    settled = kind != "N1" or normal_stress_settled(result)
+    if apart is not None and (apart >= limit or not settled):
         above = f"{'of N1, ' * (kind == 'N2')}limit {percent_of(limit)}" * (apart >= limit)
         missing = "not determined"
         note = ", ".join(filter(None, [missing, above, unused]))
@@ -139,7 +138,8 @@ def _by_law(result: Any, kind: str) -> ExpectedError:
         at = as_measured([r for r in result.records if not r.held_out], found.over_n1_rate)
         share = f"N2/N1 ≈ {significant(found.over_n1, 2)} at {at}"
         return ExpectedError(note=f"{'0' if abs(found.over_n1) < _NOTHING else share} by this law")
-    return ExpectedError(missing=unused or "not measured", spread=ends)
+    note = "" if unused is None or ends[0] is None else unused
+    return ExpectedError(missing=unused or "not measured", note=note, spread=ends)
 
 
 _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves

@@ -66,7 +66,7 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
         ends = float(np.min(frequencies)), float(np.max(frequencies))
         return Range(None, None, strain, None, ends, flows)
     turned = [r for r in fitted if _turns(r)]
-    rates = [rate for r in fitted for rate in _rates_of(r) if rate > 0.0]
+    rates = [rate for r in fitted for rate in (*_rates_of(r), abs(r.rate_before)) if rate > 0.0]
     box = None if equation is None or equation.tested is None else equation.tested.learned_in
     # one that turns has a frequency besides its rate
     found = [flow_numbers(r.time, r.rate, 1.0)[1] for r in turned]
@@ -87,6 +87,8 @@ def _range(fitted: Sequence[RunRecord], equation: Equation | None) -> Range:
 
 
 def _turns(record: RunRecord) -> bool:
+    if record.control == "stress":  # the slope of a noisy strain changes its sign at any time
+        return False
     ways = np.sign(record.rate[np.abs(record.rate) > _TURNS * record.fastest])
     # one is a reversal, unless the rate passes through all between, as in one cycle
     sizes, jumps = np.abs(record.rate), np.abs(np.diff(record.rate)) > _TURNS * record.fastest
@@ -97,18 +99,25 @@ def _turns(record: RunRecord) -> bool:
 
 def _test(record: RunRecord) -> str:
     """Return what a transient is, in words; empty of what turns, is at rest, and of states."""
-    if not record.is_transient or _turns(record) or record.fastest == 0.0:
+    before = record.rate_before
+    if not record.is_transient or _turns(record) or (record.fastest == 0.0 and not before):
         return ""
     if record.control == "stress":
         return "creep"
     rates = record.rate * np.sign(record.rate[-1])
-    return "start-up" if np.percentile(rates, 5.0) > _SAME * record.fastest else "steps of rate"
+    one = np.percentile(rates, 5.0) >= _SAME * record.fastest
+    if before:
+        return "cessation" if one and record.fastest <= _AT_REST * abs(before) else "steps of rate"
+    return "start-up" if one else "steps of rate"
 
 
 def described(record: RunRecord) -> str:
     """Return what a run is with its rates as the instrument had them, and its name in brackets."""
-    first, last = (significant(abs(float(rate)), 2) for rate in record.unshifted.rate[[0, -1]])
-    told = {"start-up": "the start-up at", "steps of rate": f"the step from {first} to"}
+    own = record.unshifted
+    rates = own.rate_before or own.rate[0], own.rate[-1]
+    first, last = (significant(abs(float(rate)), 2) for rate in rates)
+    step = f"the step from {first} to"
+    told = {"start-up": "the start-up at", "steps of rate": step, "cessation": step}
     what = told.get(_test(record), "")
     return f"{what} {last} 1/s ({record.name})" if what else record.name
 

@@ -147,13 +147,18 @@ class Path:
         found = self.predicted(self.fit, Rows.of(runs), True) if runs else np.empty((0, 0))
         return record_runs(runs, found[None], True)
 
+    @cached_property
+    def declared_theta(self) -> Float[np.ndarray, " p"]:
+        """Constants of the declared model as fitted to the runs alone, the bench ideal."""
+        problem = self.posterior.problem
+        theta, own = problem.zero.copy(), [*problem.model.free_positions, *self._varying]
+        theta[own] = self.fitted(()).theta[own]
+        return theta
+
     def declared_predicted(self, rows: Rows) -> Float[np.ndarray, "runs n"]:
-        """Return what the declared model predicts, its constants as fitted and the bench ideal."""
-        problem, theta = self.posterior.problem, self.posterior.problem.zero.copy()
-        own = [*problem.model.free_positions, *self._varying]
-        theta[own] = self.path[0].theta[own]
+        """Return what the declared model predicts."""
         with np.errstate(all="ignore"):
-            return problem.model.predictions([theta], rows.batch)[0]
+            return self.posterior.problem.model.predictions([self.declared_theta], rows.batch)[0]
 
     @property
     def _varying(self) -> list[int]:

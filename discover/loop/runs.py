@@ -175,9 +175,10 @@ class RunRecord:
     which flow it is. `quantity`: what is recorded: ``sigma12``, ``tensile_stress``, ``N1``, ``N2``,
     ``storage_modulus`` or ``loss_modulus`` in Pa, or ``strain``. `band`: where 95 % of the
     measurements should lie by all explanations together, shape (2, n). `by_explanation`: what each
-    explanation predicts, in the order of their probability, shape (explanations, n). `control`:
-    what was imposed. Where it is ``steady`` or ``oscillation``, time only counts the samples;
-    strain and rate of an oscillation are amplitudes.
+    explanation predicts, in the order of their probability, shape (explanations, n).
+    `rate_before`: of the steady flow before it, in 1/s; 0 without one. `control`: what was imposed.
+    Where it is ``steady`` or ``oscillation``, time only counts the samples; strain and rate of an
+    oscillation are amplitudes.
     """
 
     name: str
@@ -196,6 +197,7 @@ class RunRecord:
     control: Control = "rate"
     by_explanation: Float[np.ndarray, "explanations n"] | None = None
     has_normal_stress: bool = False  # whether N1 was recorded as well
+    rate_before: float = 0.0
 
     @property
     def fastest(self) -> float:
@@ -223,7 +225,8 @@ class RunRecord:
     @property
     def unshifted(self) -> "RunRecord":
         """The run with times and rates as the instrument had them."""
-        return replace(self, time=self.instrument_time, rate=self.rate / self.shift)
+        before, rate = (rate / self.shift for rate in (self.rate_before, self.rate))
+        return replace(self, time=self.instrument_time, rate=rate, rate_before=before)
 
     @property
     def is_transient(self) -> bool:
@@ -274,6 +277,7 @@ def record_runs(
                 quantity=run.quantity,
                 control=run.protocol.control,
                 has_normal_stress=run.first_normal_stress_difference is not None,
+                rate_before=run.rate_before,
             )
         )
     return records

@@ -9,7 +9,7 @@ from discover.answer.modes_in_words import OF_SWEEP, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH, SYMBOLS, differ
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
-from discover.loop.fitted_range import as_measured, described
+from discover.loop.fitted_range import as_measured, by_temperature, described
 from discover.loop.runs import RunRecord
 
 MOST_NAMES = 3
@@ -88,6 +88,12 @@ def what_to_measure_next(result: Any) -> str:
     if result.verdict == "unexplained":
         if own := suspected(result):  # of the instrument
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
+        fitted = [record for record in result.records if not record.held_out]
+        if len({one.temperature_C for one in fitted} - {None}) > 1 and not by_temperature(fitted):
+            return (
+                "Fit the runs of one temperature ([data] fit), or shift their times to one ([data] "
+                "clock_factor)."
+            )
         return _of_another_stress(result) or _by_geometry(result)
     # the stage to confirm first: one with aliases before one without
     with_aliases = [stage for stage in result.stages if stage.aliases]

@@ -177,6 +177,15 @@ def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, cas
     assert result.stdout == ""
 
 
+@pytest.mark.parametrize("arguments", [("fit", "giesekus"), ("compare",)])
+def test_a_tolerance_that_is_none_is_refused_with_what_was_got(tmp_path, arguments):
+    (tmp_path / "mine.toml").write_text(STUDY)
+    data_folder(tmp_path / "runs")
+    where = tmp_path / ("runs" if "fit" in arguments else "mine.toml")
+    result = invoke(*arguments, where, "--tolerance", "-1", code=2)
+    assert "tolerance: should be greater than 0; got -1" in result.stderr
+
+
 def test_data_commands(tmp_path, monkeypatch):
     data_folder(tmp_path / "mine")
     monkeypatch.setenv("DISCOVER_DATA", str(tmp_path))

@@ -10,8 +10,15 @@ from independent import start_up as flow_at
 from independent.noise import white
 from scipy.integrate import cumulative_trapezoid
 
-from discover.comparison import compare, relative_errors
-from discover.comparison.flows import Flow, thinned_to, true_terms, without_spikes_in_fit
+from discover.comparison import compare
+from discover.comparison.flows import (
+    Flow,
+    comparison_flows,
+    relative_errors,
+    thinned_to,
+    true_terms,
+    without_spikes_in_fit,
+)
 from discover.comparison.learning import at_once
 from discover.comparison.outcome import place
 from discover.comparison.run_comparison import data_in_words
@@ -249,3 +256,35 @@ def test_a_ringing_rate_keeps_the_knots_that_it_needs_also_where_an_outlier_stoo
     # the strain is right to 0.1 % of its range, 1 − cos from 0 to 2
     strain = cumulative_trapezoid(rates, knots, initial=0.0)
     assert np.max(np.abs(strain - (1.0 - np.cos(knots)))) < 2e-3
+
+
+def recorded(name, rate):
+    stress = 1.0 - np.exp(-TIME)
+    return Run(
+        name, TIME, start_up(rate), np.full(201, rate), stress,
+        first_normal_stress_difference=rate * stress**2,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("fitted", [True, False])
+def test_a_normal_stress_that_is_a_record_of_its_own_stands_once(fitted):
+    data = Dataset("both", (recorded("slow", 0.1), recorded("fast", 0.2))).quantity_by_quantity()
+    fit, held_out = ["slow"], ["fast", "fast (N1)"]
+    (fit if fitted else held_out).append("slow (N1)")
+    divided = StudyData(data, data.select(fit), data.select(held_out))
+    flows = {flow.name: flow for flow in comparison_flows(divided, ())}
+    # fitted or tested as the σ12 of its run is, it is in that flow, else in one of its own
+    assert set(flows) == {"slow", "fast"} | (set() if fitted else {"slow (N1)"})
+    assert ("N1" in flows["slow"].reference) is fitted
+    assert "N1" in flows["fast"].reference
+
+
+def test_a_normal_stress_is_not_compared_where_no_fluid_can_have_it():
+    run = recorded("slow", 1.0)
+    early = TIME < 0.5  # more than the elastic limit, stress × strain, at strains below 0.5
+    bad = np.where(early, 5.0, run.first_normal_stress_difference)
+    data = Dataset("lag", (replace(run, first_normal_stress_difference=bad),))
+    (flow,) = comparison_flows(StudyData(data, data, Dataset("none", ())), ())
+    assert np.all(np.isnan(flow.reference["N1"][early]))
+    true = {"sigma12": run.stress, "N1": run.first_normal_stress_difference, "N2": 0.0 * TIME}
+    assert relative_errors(true, flow.reference)["N1"] == 0.0

@@ -53,7 +53,8 @@ def taken_out(data, effects, of_fluid=("giesekus_mobility",)):
     """Return data without known effects, beside what a short search finds, and what these did."""
     declared = with_known(declared_fluid(Fluid(), data), effects)
     task = Task.of_runs(data, forward_model(declared), effects=of_fluid, max_effects=1)
-    return without_instrument(divided(data), search(task).ended(), declared.effects)
+    ended = search(task).ended()
+    return without_instrument(divided(data), ended, declared.effects, ended.fit.theta)
 
 
 def taken(data, effects):

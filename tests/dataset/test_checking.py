@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from command_line import invoke
+from independent.homogeneous import GiesekusFluid
 from made_exports import LAMBDA as RELAXATION_TIME
 from made_exports import G as MODULUS
 from made_exports import sweep_table, write_runs
@@ -201,6 +202,18 @@ def test_a_steady_n1_is_held_against_laun_where_cox_and_merz_hold(folder, factor
     run, normal = thinning(2.0)
     findings = check_folder(folder({**run, "N1_Pa": factor * normal}))
     assert any("Laun's rule" in f.text for f in findings) is doubted
+
+
+def test_the_normal_stress_of_a_giesekus_fluid_of_one_mode_is_not_held_against_laun(folder):
+    # At α = 0.4 and G′/G″ = λγ̇ = 4 it follows Cox and Merz within 2 % at 0.27 of Laun's N1
+    rate, fluid = 4.0 / RELAXATION_TIME, GiesekusFluid((MODULUS,), (RELAXATION_TIME,), 0.4)
+    stress = fluid.stress("shear", lambda _: rate, TIMES[1:])
+    run = {
+        "time_s": TIMES[1:], "shear_rate_1_s": np.full(len(stress), rate),
+        "stress_Pa": stress[:, 0, 1], "N1_Pa": stress[:, 0, 0] - stress[:, 1, 1],
+    }  # fmt: skip
+    findings = check_folder(folder(run, sweep=sweep_table(30)))
+    assert not any("Laun's rule" in f.text for f in findings)
 
 
 def test_a_normal_stress_that_no_fluid_has_is_neither_fitted_nor_judges(folder):

@@ -107,6 +107,15 @@ def test_a_name_means_one_quantity_and_every_quantity_has_names_and_can_be_named
         assert "step_time" in tables_of(name)
 
 
+@pytest.mark.parametrize(("known", "modulus"), [("Storage modulus", STORAGE), ("G''", LOSS)])
+def test_one_modulus_and_the_tangent_of_the_loss_angle_give_the_other(tmp_path, known, modulus):
+    tangent = np.divide(LOSS, STORAGE)
+    names, units = ("ω", known, "tan(delta)"), ("rad/s", "Pa", "-")
+    table = columns(read(tmp_path, lines(names, units, OMEGA, modulus, tangent)).files["lve.csv"])
+    np.testing.assert_allclose(table["Gp_Pa"], STORAGE)
+    np.testing.assert_allclose(table["Gpp_Pa"], LOSS)
+
+
 def test_viscosities_and_normal_stress_coefficients_become_stresses_by_their_rates(tmp_path):
     time, thick = [0.1, 0.2, 0.4, 0.8, 1.6], [100.0, 180.0, 300.0, 450.0, 700.0]
     for name in ("Extensional viscosity", "Viscosity"):

@@ -34,7 +34,7 @@ from discover.equations.parts import StatePart
 from discover.errors import InputError
 from discover.forward import data_scales
 from discover.laws import LAWS
-from discover.protocols import start_up
+from discover.protocols import after_step_strain, start_up
 
 NAMED = list(named_effects().values())
 STRESS = jnp.array([1.3, -0.2, 0.1, 0.7])
@@ -328,3 +328,13 @@ def test_an_equation_has_the_letters_of_its_table_and_an_exported_law_each_once(
     assert len(re.findall(r"t_\\mathrm\{b\}' = 5", text)) == 1
     assert len(re.findall(r"t_\\mathrm\{b\} = 7", text)) == 1
     assert r"\frac{ds'}{dt}" in law.latex()
+
+
+@pytest.mark.parametrize("strain", [0.01, 0.1, 1.0])
+def test_the_compliance_of_a_sound_tool_times_a_modulus_is_the_same_whatever_the_strain(strain):
+    time = np.linspace(0.1, 5.0, 20)
+    step = after_step_strain(start_up(0.0), strain, first=0.1)
+    stress = strain * 100.0 * np.exp(-time)
+    relaxation = Run("step", time, step, 0.0 * time, stress, strain=strain + 0.0 * time)
+    size = np.sqrt(np.mean((100.0 * np.exp(-time)) ** 2))
+    assert data_scales([relaxation])["compliance"] * size == pytest.approx(1.0)

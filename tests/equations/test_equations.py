@@ -113,6 +113,14 @@ NAMED = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("form", [form for form in equations.FORMATS if form != "json"])
+def test_a_number_is_written_without_the_rounding_of_the_machine_and_json_keeps_it(form):
+    value = 0.2999999999999975
+    law = equations.Equation((LawTerm("sigma.sigma", value),), (value,), (value,), True, value)
+    assert "9999" not in equations.write_equation(law, form)
+    assert str(value) in equations.write_equation(law, "json")
+
+
 @pytest.mark.parametrize("name", NAMED)
 def test_rheotools_own_equations_give_the_stress_of_the_law(name):
     parameters, kind = NAMED[name]

@@ -5,17 +5,19 @@ import pytest
 from independent import Giesekus
 from independent.noise import white
 from noisy_runs import run_at, run_of_wave
+from scipy.integrate import solve_ivp
 
 import discover as dc
 from discover.answer.simple_material import SimpleMaterial, material_of
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
 from discover.inference.engine import simple_materials
+from discover.inference.engine.closed_forms import recorded
 from discover.inference.engine.simple_materials import SimpleFit
 from discover.loop import run_loop
 from discover.loop.simple import check_of
+from discover.protocols import imposed_stress, steady_rates
 from discover.protocols import oscillations as oscillations_of
-from discover.protocols import steady_rates
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 RATES = np.geomspace(0.01, 100.0, 25)
@@ -52,6 +54,20 @@ def start_ups(stress, noise=0.01):
     ]
 
 
+def creep(compliance, noise=0.01):
+    """Creep at two stresses of what has a compliance in 1/Pa of the time in s."""
+    times = np.linspace(0.1, 20.0, 60)
+    return [
+        crept(times, level * np.ones(60), noisy(level * compliance(times), noise, seed))
+        for seed, level in enumerate((10.0, 30.0))
+    ]
+
+
+def crept(times, stress, strain):
+    rate = np.gradient(strain, times)
+    return Run(f"{stress[0]:g}", times, imposed_stress(times, stress), rate, stress, strain=strain)
+
+
 def material_in(runs, modulus=1.0) -> SimpleMaterial | None:
     declared = DeclaredModel.named("ucm", {}, [modulus], [1.0])
     return run_loop(Dataset("runs", tuple(runs)), declared, effects=FEW, max_effects=1).material
@@ -66,6 +82,9 @@ def material_in(runs, modulus=1.0) -> SimpleMaterial | None:
         (start_ups(lambda t, rate: 5.0 * rate + 0.0 * t), "newtonian", (5.0,)),
         (sweep(np.full(25, 50.0), 2.0 * FREQUENCIES), "kelvin_voigt", (50.0, 2.0)),
         (start_ups(lambda t, rate: rate * (50.0 * t + 20.0)), "kelvin_voigt", (50.0, 20.0)),
+        (creep(lambda t: -np.expm1(-t / 2.0) / 50.0), "kelvin_voigt", (50.0, 100.0)),
+        (creep(lambda t: 0.02 + 0.0 * t), "kelvin_voigt", (50.0, 0.0)),
+        (creep(lambda t: t / 20.0), "newtonian", (20.0,)),
     ],
 )
 def test_a_simple_material_is_named_with_its_constants(runs, law, constants):
@@ -141,6 +160,39 @@ def test_a_maxwell_fluid_and_a_power_law_are_none_of_them():
     assert material_in(sweep(100.0 * w**2 / (1.0 + w**2), 100.0 * w / (1.0 + w**2))) is None
     assert material_in(start_ups(lambda t, rate: 100.0 * rate * (1.0 - np.exp(-t)))) is None
     assert material_in([flow_curve(lambda r: 3.0 * r**0.5)]) is None
+    assert material_in(creep(lambda t: (1.0 + t) / 100.0), modulus=100.0) is None
+
+
+@pytest.mark.parametrize(
+    ("law", "constants", "modes", "solvent"),
+    [
+        ("maxwell", (30.0, 2.0, 5.0), [(30.0, 2.0)], 5.0),
+        ("two_modes", (30.0, 0.5, 10.0, 4.0), [(30.0, 0.5), (10.0, 4.0)], 1e-3),
+        ("kelvin_voigt", (30.0, 60.0), [(30.0, 1e9)], 60.0),
+    ],
+)
+def test_creep_and_recovery_in_closed_form_follow_the_equations_of_the_modes(
+    law, constants, modes, solvent
+):
+    times = np.linspace(0.02, 10.0, 500)
+    stress = np.where(times < 5.0, 20.0, 0.0)
+    moduli, relaxes = np.array(modes).T
+
+    def slopes(time, state, level):
+        # of a solvent so thin that it slows two modes by 1e-4 s alone
+        rate = (level - np.sum(state[:-1])) / solvent
+        return np.append(moduli * rate - state[:-1] / relaxes, rate)
+
+    begin, state, strain = 0.0, np.zeros(len(modes) + 1), []
+    for part, level in ((times[times < 5.0], 20.0), (times[times >= 5.0], 0.0)):
+        ends = (begin, part[-1])
+        solved = solve_ivp(slopes, ends, state, "LSODA", part, args=(level,), rtol=1e-8, atol=1e-10)
+        begin, state = part[-1], solved.y[:, -1]
+        strain.append(solved.y[-1])
+    strain = np.concatenate(strain)
+    found = recorded(law, constants, crept(times, stress, strain))
+    # a jump takes a thousandth of the 0.02 s between two samples
+    np.testing.assert_allclose(found, strain, atol=1e-4 * np.max(strain))
 
 
 @pytest.mark.parametrize(

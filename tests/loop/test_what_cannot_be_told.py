@@ -13,7 +13,7 @@ import discover as dc
 from discover.dataset.records.repeats import count_flows
 from discover.identify.twins import oil_twin
 from discover.loop import DeclaredModel, run_loop
-from discover.protocols import oscillatory_shear, start_up
+from discover.protocols import after_step_strain, oscillatory_shear, start_up
 from discover.protocols.control import steady_rates
 from discover.report.loop import loop_verdict
 
@@ -214,6 +214,9 @@ def test_an_inertia_behind_the_motor_is_a_solvent_beside_the_mode():
     solvent = inertia / rise
     mode = (viscosity - solvent) * rate * -np.expm1(-SHORT / rise) + solvent * rate
     np.testing.assert_allclose(mode, viscosity * behind + inertia * change, rtol=1e-12)
+    step = after_step_strain(start_up(0.0), 1.0, first=0.1)
+    relaxed = dc.Run("step", np.ones(1), step, np.zeros(1), np.ones(1))
+    assert oil_twin(1.0, 1.0, 0.0, [relaxed]) is None  # the strain was on when the record began
     found = oil_twin((viscosity - solvent) / rise, rise, solvent, list(of_oil((1.0,))))
     exact = {"viscosity": viscosity, "rise_time": rise, "inertia": inertia}
     assert found == {name: pytest.approx(value, rel=1e-12) for name, value in exact.items()}

@@ -61,7 +61,7 @@ def test_the_first_line_has_law_constants_error_and_range():
 
 
 KNOWN, OPEN = ExpectedError(0.03), ExpectedError(missing="not determined", note="laws differ")
-AGREED = ExpectedError(0.03, is_measured=False, spread=(0.03, 0.04))
+AGREED = ExpectedError(spread=(0.03, 0.04))
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ AGREED = ExpectedError(0.03, is_measured=False, spread=(0.03, 0.04))
         (("shear",), {"N1": AGREED}, "σ12"),
         (
             ("shear",),
-            {"N1": ExpectedError(0.17, is_measured=False, spread=(0.17, 0.2))},
+            {"N1": ExpectedError(spread=(0.17, 0.2))},
             "σ12 only",
         ),
         # measured: the table has the error
@@ -303,7 +303,7 @@ def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_
     told = replace(MELT, expected_error=errors, range=both).headline
     assert f"data: σ12 6 % ({own}), uniaxial extension 17 %, worst run 8 %." in told
     # not of what the law alone says, nor of fitted runs
-    for other in ({"is_measured": False}, {"is_residual": True}):
+    for other in ({"inside": None, "spread": (0.17, 0.2)}, {"is_residual": True}):
         same = {**errors, "uniaxial": replace(errors["uniaxial"], **other)}
         assert (
             "mean error 6 % (95 % CI 4–7 %) on 2 unseen runs, worst run 8 %,"
@@ -328,6 +328,9 @@ def test_a_constant_that_differs_from_mode_to_mode_is_a_range_over_them():
     assert heads == ["mode", "G (Pa)", "λ (s)", "ε_k"]
     assert rows == [["1", "1000", "1", "(1.8)"], ["2", "100", "10", "0.12"]]
     added = Constant("relaxation_mode.G", 100.0, (30.0, 300.0), "Pa", letter="G_+")
+    slow = replace(added, name="relaxation_mode.lambda", unit="s", letter=r"\lambda_+")
+    linear = replace(MELT, title="linear viscoelastic", constants=(added, slow))
+    assert linear.headline.startswith("Linear viscoelastic, 2 modes.")  # one alone is no spectrum
     fit = replace(fit, constants=(added,))
     assert "1 constant (1 poorly determined), 2 modes." in fit.headline
     assert origin(fit) == " (1 given, 1 added)"

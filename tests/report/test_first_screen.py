@@ -192,7 +192,7 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
         one_range.headline
     )
     assert screen_of(several)["expected"][0].rows[-1].note == "b"
-    by_law = ExpectedError(0.15, note="by law", is_measured=False, spread=(0.15, 0.2))
+    by_law = ExpectedError(note="by law", spread=(0.15, 0.2))
     pulled = {**MELT.expected_error, "N1": by_law, "uniaxial": ExpectedError(0.05)}
     screen = screen_of(several, expected_error=pulled)
     measured, untested = ({one.symbol: one for one in e.rows} for e in screen["expected"])

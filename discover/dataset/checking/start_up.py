@@ -32,8 +32,9 @@ _FEWEST_LEFT = 10
 # Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number, and of what it
 # predicts a modulus and a time that are off leave this factor open
 _SLOW, _SECOND_ORDER_FACTOR = 0.3, 3.0
-# Laun's rule is one of experience, and holds to some ten per cent where Cox's and Merz's does
-_COX_MERZ, _LAUN_FACTOR, _LARGEST_RATIO = 1.15, 2.0, 5.0
+# Laun's rule is one of experience with melts, and holds to some ten per cent where Cox's and Merz's
+# does; a Giesekus fluid of one mode follows Cox's and Merz's with a fifth of it at this ratio
+_COX_MERZ, _LAUN_LIMITS, _LARGEST_RATIO = 1.15, (0.2, 2.0), 5.0
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25
@@ -189,7 +190,7 @@ def _laun(run: Run, rate: float, end: float, sweep: LinearSweep) -> Iterator[_Fa
         storage <= _LARGEST_RATIO * loss
         and 1.0 / _COX_MERZ < steady / np.hypot(storage, loss) < _COX_MERZ
     )
-    if holds and not rule / _LAUN_FACTOR <= end <= rule * _LAUN_FACTOR:
+    if holds and not _LAUN_LIMITS[0] <= end / rule <= _LAUN_LIMITS[1]:
         yield _Fault(
             f"ends at {end:.3g} Pa where Laun's rule has {rule:.3g} Pa, though the stress of the "
             "same run follows the rule of Cox and Merz. A baseline, or a gap that gives "

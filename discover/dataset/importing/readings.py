@@ -224,7 +224,10 @@ class Readings:
         return None if rate is None else self._column(source) * rate**power
 
     def _modulus(self, part: np.ufunc) -> Values | None:
-        """Return the part of |G*|, or of |η*| ω, that the angle of loss or its tangent gives."""
+        """Return the part of |G*| that the angle of loss or its tangent gives.
+
+        |G*| as a column, |η*| ω, or of the other modulus.
+        """
         angle = self.alone("phase_angle")
         if angle is None and (factor := self.alone("loss_factor")) is not None:
             angle = np.arctan(factor)
@@ -232,6 +235,9 @@ class Readings:
         if angle is not None and size is None and "complex_viscosity" in self.columns:
             omega = self.get("omega")
             size = None if omega is None else self._column("complex_viscosity") * omega
+        for key, own in (("Gp", np.cos), ("Gpp", np.sin)):
+            if angle is not None and size is None and key in self.columns:
+                size = self._column(key) / own(angle)
         return None if angle is None or size is None else size * part(angle)
 
     def _constant(self, key: str) -> float | None:

@@ -10,8 +10,8 @@ that of Herschel & Bulkley 1926, Kolloid-Z. 39, 291, whose yield stress sets in 
     σ12 = sign(γ̇) (τ_y (1 − exp(−m |γ̇|)) + K |γ̇|^n),
 
 the same without a yield stress [Ostwald 1925, Kolloid-Z. 36, 99], the solid of Kelvin & Voigt,
-σ12 = G γ + η γ̇, and one Maxwell mode with a Newtonian solvent, or two without   [Tschoegl 1989,
-The Phenomenological Theory of Linear Viscoelastic Behavior, ch. 3].
+σ12 = G γ + η γ̇, and one Maxwell mode with a Newtonian solvent, or two without, in creep too
+[Tschoegl 1989, The Phenomenological Theory of Linear Viscoelastic Behavior, ch. 3].
 """
 
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def viscosity(
 
 
 def recorded(law: str, constants: Constants, run: Run) -> Float[np.ndarray, " n"]:
-    """Return what a law records in a run, in Pa: moduli, or σ12 in shear at a given rate.
+    """Return what a law records: moduli or σ12 in shear at a given rate, in Pa, or strain in creep.
 
     `constants`: as of `viscosity`; G and η of a solid; G, λ and η_s of one mode; or G and λ of each
     of two. What remembers takes runs from rest.
@@ -75,12 +75,43 @@ def recorded(law: str, constants: Constants, run: Run) -> Float[np.ndarray, " n"
             x = omega * time
             whole = whole + modulus * (x**2 if storage else x) / (1.0 + x**2)
         return whole
+    if run.protocol.control == "stress":
+        return _crept(law, constants, run)
     if law == KELVIN_VOIGT:
         return constants[0] * strain_of(run) + constants[1] * run.rate
     if law in (MAXWELL, TWO_MODES):
-        whole = np.sum([g * _relaxing(run, time) for g, time in modes], axis=0)
-        return whole + solvent * run.rate
+        each = [g * _relaxing(run.time, run.rate, time) for g, time in modes]
+        return np.sum(each, axis=0) + solvent * run.rate
     return viscosity(law, constants, run.rate) * run.rate
+
+
+def _crept(law: str, constants: Constants, run: Run) -> Float[np.ndarray, " n"]:
+    """Return the strain at a given stress, from rest: J0 at once, flow, one retarded compliance."""
+    knots = np.asarray(run.protocol.table_times)
+    time = np.union1d(knots, run.time)
+    stress = np.interp(time, knots, np.asarray(run.protocol.table_rates))
+    at_once, fluidity, retarded, retardation = _compliances(law, constants)
+    flowed = cumulative_trapezoid(stress, time, initial=0.0)
+    delayed = _relaxing(time - time[0], stress, retardation) / retardation
+    whole = at_once * stress + fluidity * flowed + retarded * delayed
+    return whole[np.searchsorted(time, run.time)]
+
+
+def _compliances(law: str, constants: Constants) -> tuple[float, float, float, float]:
+    """Return J0 in 1/Pa, 1/η0 in 1/(Pa s), the retarded compliance in 1/Pa and its time in s."""
+    if law == NEWTONIAN:
+        return 0.0, 1.0 / constants[0], 0.0, 1.0
+    if law == KELVIN_VOIGT:
+        return 0.0, 0.0, 1.0 / constants[0], constants[1] / constants[0]
+    modes, solvent = _modes(law, constants)
+    moduli, times = np.array(modes).T
+    eta = float(moduli @ times) + solvent
+    if law == MAXWELL:
+        retardation = times[0] * solvent / eta
+        return 0.0, 1.0 / eta, float(times[0] - retardation) / eta, float(retardation)
+    at_once = 1.0 / float(np.sum(moduli))
+    retarded = float(moduli @ times**2) / eta**2 - at_once
+    return at_once, 1.0 / eta, retarded, float(np.prod(times)) / (at_once * eta)
 
 
 def _modes(law: str, constants: Constants) -> tuple[list[tuple[float, float]], float]:
@@ -101,18 +132,19 @@ def integrated_rate(run: Run) -> Float[np.ndarray, " n"]:
     A step of strain before the record counts; a flow that had gone on does not.
     """
     time, rate = np.asarray(run.time), np.asarray(run.rate)
-    is_step = not (run.from_rest or run.rate_before or np.any(run.protocol.cycle))
     begins = np.array([float(run.protocol.begins)])
-    step = -float(strains(run.protocol, begins)[0]) if is_step else 0.0
+    step = -float(strains(run.protocol, begins)[0]) if run.after_step else 0.0
     return step + rate[0] * time[0] + cumulative_trapezoid(rate, time, initial=0.0)
 
 
-def _relaxing(run: Run, time: float) -> Float[np.ndarray, " n"]:
+def _relaxing(
+    times: Float[np.ndarray, " n"], rates: Float[np.ndarray, " n"], time: float
+) -> Float[np.ndarray, " n"]:
     """Return the stress over the modulus of a Maxwell mode, exact for a rate linear in steps."""
-    step = np.diff(run.time, prepend=0.0)
-    before = np.concatenate([run.rate[:1], run.rate[:-1]])
+    step = np.diff(times, prepend=0.0)
+    before = np.concatenate([rates[:1], rates[:-1]])
     kept = np.exp(-step / time)
-    gained = 0.5 * (before + run.rate) * time * (-np.expm1(-step / time))
+    gained = 0.5 * (before + rates) * time * (-np.expm1(-step / time))
     # each value less what is kept of the one before: two diagonals
     bands = np.stack([np.ones(len(step)), -np.append(kept[1:], 0.0)])
     (solve,) = get_lapack_funcs(("tbtrs",), (bands,))

@@ -57,7 +57,7 @@ class Nuisance:
 
 NUISANCES = (
     Nuisance("rate_gain", 1.0, "gap and angle of a cone are made to 1 % (ISO 3219-2:2021)"),
-    Nuisance("tool_compliance", 0.5, "half of a strain of 1 % at the typical stress"),
+    Nuisance("tool_compliance", 0.5, "half of a strain of 1 % at the stress of a strain of one"),
     Nuisance("time_delay", 0.05, "a fortieth of the sampling interval"),
 )
 """Effects that a sound instrument has a little of; `first_trial` of a gain is 1 %."""

@@ -2,7 +2,7 @@
 
 Each is fitted in closed form to the same rows with the same noise as hypotheses that relax, and
 weighed by the same evidence. A viscous fluid may be seen in any shear at a given rate, in flow
-curves and in moduli; a solid in moduli and in shear from rest.
+curves, in moduli and in creep; a solid in moduli, in shear from rest and in creep.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,13 +41,14 @@ _GOING_ON = "maxwell_going_on"
 alternation at one frequency it is a solid to the last digit, whatever its time."""
 
 _VISCOUS = NEWTONIAN, POWER_LAW, CARREAU_YASUDA, HERSCHEL_BULKLEY
-_WEIGHED = {"rate": _VISCOUS, "steady": _VISCOUS, "oscillation": (NEWTONIAN, KELVIN_VOIGT)}
-"""Hypotheses by what was imposed; a solid too where strains since rest are known."""
+_LINEAR = NEWTONIAN, KELVIN_VOIGT
+_WEIGHED = {"rate": _VISCOUS, "steady": _VISCOUS, "oscillation": _LINEAR, "stress": _LINEAR}
+"""Hypotheses by what was imposed; a solid too where strains since rest are known, as in creep."""
 
 _BESIDE_A_TIME = NEWTONIAN, HERSCHEL_BULKLEY
 """What a flow curve shows of a fluid whose relaxation time is known: such a fluid thins too."""
 
-_RELAXING = {"rate": (MAXWELL, _GOING_ON, TWO_MODES), "oscillation": (MAXWELL, TWO_MODES)}
+_RELAXING = MAXWELL, TWO_MODES
 """Fluids that a solid must differ from: of times within the record, for one that relaxes later is
 that solid."""
 
@@ -119,7 +120,12 @@ class _ClosedForm(Fitter):
         runs = self.rows.runs
         control = runs[0].protocol.control
         of_waves, self.is_curve = control == "oscillation", control == "steady"
-        rates = [run.angular_frequency if of_waves else run.rate for run in runs]
+        rates, stress = [run.rate for run in runs], self.rows.recorded
+        if of_waves:
+            rates = [run.angular_frequency for run in runs]
+        elif control == "stress":  # mean rates, for slopes between samples are noise
+            rates = [run.recorded[1:] / run.time[1:] for run in runs]
+            stress = np.concatenate([run.stress for run in runs])
         self.rates = np.abs(np.concatenate(rates))
         moving = self.rates[self.rates != 0.0]
         self.slowest, self.typical = np.min(moving), float(np.exp(np.mean(np.log(moving))))
@@ -127,7 +133,7 @@ class _ClosedForm(Fitter):
             max(float(run.time[-1]) for run in runs) if not of_waves else 1 / self.slowest
         )
         strains = np.ones(1) if of_waves else np.concatenate([strain_of(run) for run in runs])
-        self.stress = float(np.sqrt(np.mean(self.rows.recorded**2)))
+        self.stress = float(np.sqrt(np.mean(stress**2)))
         self.modulus = self.stress / max(float(np.sqrt(np.mean(strains**2))), 1e-300)
 
     def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
@@ -173,6 +179,8 @@ class _ClosedForm(Fitter):
                 for stretch in _STRETCHES
                 for sharpness in _SHARPNESS
             ]
+        elif self.law == KELVIN_VOIGT:
+            tried = [middle, middle[0] * np.array([1.0, times[0]])]
         elif self.law in (MAXWELL, _GOING_ON):
             tried = [np.array([middle[0], time, *middle[2:]]) for time in times]
         elif self.law == TWO_MODES:
@@ -186,7 +194,7 @@ class _ClosedForm(Fitter):
         thetas: Sequence[np.ndarray] | Float[np.ndarray, "trials p"],
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials rows"]:
-        """Return the records of the law, in Pa; it has no moduli."""
+        """Return the records of the law; it has no moduli."""
         del moduli
         found = [np.concatenate(self._of(np.asarray(theta))) for theta in thetas]
         return np.array(found).reshape(len(thetas), len(self.rows))
@@ -210,8 +218,10 @@ def describes(control: str, run: Run) -> bool:
         return False
     if control == "oscillation":
         return run.quantity in MODULI and run.strain is not None
-    if run.flow != "shear" or run.quantity != "sigma12":
+    if run.flow != "shear" or run.quantity not in ("sigma12", "strain"):
         return False
+    if control == "stress":
+        return not np.any(run.protocol.cycle)
     moves = run.rate != 0.0
     return bool(np.all(moves & (run.stress != 0.0)) if control == "steady" else np.any(moves))
 
@@ -253,7 +263,8 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         return bool(np.sqrt(np.mean(((record - fitted.record(fit)) / noise) ** 2)) < SAME)
 
     if law == KELVIN_VOIGT:
-        for own, one in (_fitted(fitter, name) for name in _RELAXING[control]):
+        going_on = (_GOING_ON,) * (control == "rate")
+        for own, one in (_fitted(fitter, name) for name in (*_RELAXING, *going_on)):
             if one.log_evidence > fit.log_evidence or is_same(own.record(one)):
                 return None
     seen = _SEEN * np.min(np.abs(fitter.rows.recorded)) if fitted.is_curve else 0.0
@@ -265,7 +276,11 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         if (left := posterior.left) is not None:
             ranks.append(search.rank(left.fit) + left.log_factor + LOG_ODDS_OF_NONE)
         others = float(np.logaddexp.reduce(ranks))
-        others -= _NEAR if is_same(fitter.record(alive[0])) else 0.0
+        if is_same(fitter.record(alive[0])):
+            times = problem.declared.relaxation_time * np.exp(alive[0].theta[1])
+            fits_time = 1 in problem.declared.free_positions
+            later = law == KELVIN_VOIGT and fits_time and np.min(times) > fitted.longest
+            others -= np.inf if later else _NEAR  # one that relaxes later is that solid
     unknown = rank + Discrepancy(fitted, fit).log_factor + LOG_ODDS_OF_NONE
     # one that leaves something is told where all that relaxes leaves something too
     whole = np.logaddexp(rank, unknown) if posterior.verdict == "unexplained" else rank
@@ -276,7 +291,11 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     sets_in = law == HERSCHEL_BULKLEY and not fitted.is_curve
     free, onset = (fit.free[:-1], float(fit.theta[-1])) if sets_in else (fit.free, None)
     values = tuple(float(fit.theta[at]) for at in free)
-    return SimpleFit(law, values, tuple(map(fit.interval, free)), fitted.misfit(fit), odds, onset)
+    ends = list(map(fit.interval, free))
+    if law == KELVIN_VOIGT:  # a logarithm never reaches a viscosity of zero
+        inviscid = fitted.predict([np.array([values[0], fitted.priors(())[1].low])])[0]
+        ends[1] = (0.0 if is_same(inviscid) else ends[1][0], ends[1][1])
+    return SimpleFit(law, values, tuple(ends), fitted.misfit(fit), odds, onset)
 
 
 def _fitted(fitter: Fitter, law: str, least: float = -np.inf) -> tuple[_ClosedForm, Fit]:

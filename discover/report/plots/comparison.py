@@ -233,7 +233,7 @@ def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> N
     ]
     if quantity == "N2" and "N1" in flow.reference:
         # a small N2 would look large: always at least a hundredth of N1
-        values.append(0.01 * np.max(np.abs(flow.reference["N1"])) * np.array([-1.0, 1.0]))
+        values.append(0.01 * np.nanmax(np.abs(flow.reference["N1"])) * np.array([-1.0, 1.0]))
     joined = np.concatenate(values) if values else np.zeros(1)
     joined = joined[np.isfinite(joined)]
     joined = joined if joined.size else np.zeros(1)
