@@ -47,7 +47,7 @@ def errors(answer: Any) -> list[Errors]:
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         near, far = ("" if value is None else at_most(value) for value in one.spread)
-        if one.inside is not None or (one.is_measured and one.is_known):
+        if one.is_known:
             beyond, at = "not measured", ""
             if one.beyond is not None:
                 beyond, at = at_most(one.beyond), one.beyond_at or _BY_LAWS

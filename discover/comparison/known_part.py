@@ -65,7 +65,7 @@ class Frame:
         """Return what the declared model predicts as fitted alone, by the key of the flow."""
         model = _as_fitted(declared, ended, ended.declared_theta)
         _, added = without_instrument(self.data, ended, model.effects, ended.declared_theta)
-        found, own = simulated(model.fluid, self.flows)[0], replace(self, added=added)
+        found, own = simulated(model.fluid, self.flows), replace(self, added=added)
         return {flow.key: own.recorded(flow, found[flow.key]) for flow in self.flows}
 
 
