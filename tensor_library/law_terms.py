@@ -110,20 +110,6 @@ class LawTerms:
             for own in [parse_term(name).inner_names]
         )
 
-    @property
-    def values(self) -> Float[np.ndarray, " p"]:
-        """Coefficients, then inner parameters, in their order."""
-        return np.array([*self.coefficients.values(), *self.inner.values()], dtype=float)
-
-    def at(self, values: Iterable[float]) -> "LawTerms":
-        """Return the sum with other `values`."""
-        numbers = [float(value) for value in values]
-        split = len(self.coefficients)
-        return LawTerms(
-            dict(zip(self.coefficients, numbers[:split], strict=True)),
-            dict(zip(self.inner, numbers[split:], strict=True)),
-        )
-
     def over(self, library: TermLibrary) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]:
         """Return coefficients over a library that holds the terms, and its inner parameters."""
         coefficients = np.zeros(len(library))
@@ -132,21 +118,6 @@ class LawTerms:
         defaults = zip(library.inner_names, library.inner_default, strict=True)
         inner = [self.inner.get(name, default) for name, default in defaults]
         return coefficients, np.asarray(inner, dtype=float)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the sum as JSON-able values, as rows of a search hold it."""
-        return {
-            "support": list(self.coefficients),
-            "coefficients": list(self.coefficients.values()),
-            "inner": dict(self.inner),
-        }
-
-    @classmethod
-    def from_json(cls, row: Mapping[str, Any]) -> "LawTerms":
-        """Return the sum that `to_json` wrote; keys beside are passed over."""
-        return cls(
-            dict(zip(row["support"], row["coefficients"], strict=True)), dict(row.get("inner", {}))
-        )
 
 
 def _tuples(value: Any) -> Any:

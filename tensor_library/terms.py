@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -19,9 +19,6 @@ from tensor_library.algebra import (
 )
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
 from tensor_library.notation import LatexNotation, Notation
-
-if TYPE_CHECKING:
-    import sympy
 
 _NO_POWERS = (0,) * len(INVARIANT_NAMES)
 
@@ -156,12 +153,6 @@ class CandidateTerm:
                 trace = notation.spelled(name)
                 factors.append(trace if power == 1 else notation.power(trace, power))
         return notation.product([*factors, notation.spelled(TENSOR_NAMES[self.tensor])])
-
-    def sympy(self) -> "sympy.Expr":
-        """Return the term as a SymPy expression with non-commuting tensors."""
-        from tensor_library.sympy_notation import SympyNotation
-
-        return self.spell(SympyNotation())
 
     def latex(self) -> str:
         """Return the term as LaTeX, ready for a coefficient in front: a sum has its brackets."""

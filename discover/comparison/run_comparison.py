@@ -1,9 +1,7 @@
 """Comparison of a study, part by part, so that a run that was stopped can go on."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -132,17 +130,7 @@ def compare(
         return _of_material(simple, study, data, declared, learning.seed)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     times.learning()
-
-    def structure_at(terms: Sequence[LawTerm]) -> Structure | None:
-        runs, model = frame.data.fit.runs, frame.model
-        normal = options.use_normal_stresses
-        return analyse_structure(runs, library, terms, model.fluid, normal)
-
-    sheared = any(flow.in_shear for flow in frame.flows if flow.kind == "training")
-    with ThreadPoolExecutor(1) as beside:
-        # at a first start its program takes as long to compile as a learner learns
-        alone = beside.submit(copy_context().run, structure_at, ()) if sheared else None
-        own = learning.outcomes(options.learners, frame, times.learned)
+    own = learning.outcomes(options.learners, frame, times.learned)
     times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
@@ -177,11 +165,7 @@ def compare(
             data.dataset, study.data.material, data.dataset.name
         ),
     )  # fmt: skip
-
-    def determined(terms: Sequence[LawTerm]) -> Structure | None:
-        return None if alone is None else structure_at(terms) or alone.result()
-
-    comparison = _with_what_is_open(comparison, found, frame, data, study, library, determined)
+    comparison = _with_what_is_open(comparison, found, frame, data, study, library)
     progress("done", 1.0)
     return comparison
 
@@ -217,9 +201,20 @@ def _of_material(
     )  # fmt: skip
 
 
+def _structure(
+    terms: Sequence[LawTerm], frame: Frame, library: TermLibrary, use_normal_stresses: bool
+) -> Structure | None:
+    """Return what shear determines at a law, or at the known part where that law diverges."""
+    runs, known = frame.data.fit.runs, frame.model.fluid
+    if not any(run.flow == "shear" for run in runs):
+        return None
+    found = analyse_structure(runs, library, terms, known, use_normal_stresses)
+    return found or analyse_structure(runs, library, (), known, use_normal_stresses)
+
+
 def _with_what_is_open(
     comparison: Comparison, found: Found, frame: Frame, data: StudyData, study: Study,
-    library: TermLibrary, determined: Callable[[Sequence[LawTerm]], Structure | None],
+    library: TermLibrary,
 ) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
@@ -233,7 +228,7 @@ def _with_what_is_open(
     if terms is None:
         sparse = comparison.outcomes.get("tensor_sindy")
         terms = () if sparse is None else tuple(term.in_law for term in sparse.terms)
-    structure = determined(terms)
+    structure = _structure(terms, frame, library, study.compare.use_normal_stresses)
     twins: list[Rival] = []
     if comparison.verdict == "explained":
         twins = exact_twins(terms, frame.model, frame.flows, library)

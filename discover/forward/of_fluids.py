@@ -20,7 +20,6 @@ from discover.forward.grid import STRAIN_STEP, had_gone_on
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
 from discover.forward.side_by_side import MadeOnce
-from discover.laws.each_mode import law_of_mode
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import FOLLOWED, MODULI
@@ -94,16 +93,6 @@ def components(fluids: Sequence[Fluid], batch: Batch) -> Float[np.ndarray, "flui
         found = predictor.whole(trials, batch, number)[..., 2:]
         out[:, rows, : found.shape[2]] = found
     return out
-
-
-def of_each_mode(fluid: Fluid, batch: Batch) -> Float[np.ndarray, "modes runs n s"]:
-    """Return the dimensionless states of each mode in flows at a given rate.
-
-    Nothing couples modes there: they are followed side by side, as fluids of one mode.
-    """
-    times = enumerate(np.asarray(fluid.relaxation_time))
-    alone = [Fluid(law_of_mode(fluid.law, number), 1.0, time) for number, time in times]
-    return components(alone, batch)
 
 
 def velocity_gradients(

@@ -213,7 +213,7 @@ def unseen_directions(
         if not np.any(vector):
             continue  # of fewer samples than terms, elimination may use a direction up
         vector = vector / vector[np.argmax(np.abs(vector))]
-        entries = np.flatnonzero(np.abs(vector) > _ENTRY)
+        entries = np.flatnonzero(np.abs(vector) > _ENTRY).tolist()
         coefficients = {names[i]: float(np.round(vector[i], 12)) for i in entries}
         sizes = {q: float(np.linalg.norm(block @ vector)) for q, block in quantities.items()}
         found.append(Direction(coefficients, sizes))

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, AbstractExtendedLaw, State
-from tensor_library.algebra import Symmetric, VelocityGradient
+from tensor_library.algebra import Symmetric
 
 Tree = TypeVar("Tree")
 
@@ -41,14 +41,6 @@ class LawOfEachMode(AbstractExtendedLaw):
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h of the law, of one mode."""
         return self.law.extra_term(stress, rate)
-
-    def trace_relaxation(self, stress: State) -> Float[Array, ""]:
-        """Return that of the law, of one mode."""
-        return self.law.trace_relaxation(stress)
-
-    def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
-        """Return that of the law, of one mode."""
-        return self.law.stress_rate(stress, velocity_gradient)
 
 
 def law_of_each_mode(laws: Sequence[AbstractConstitutiveLaw]) -> LawOfEachMode:

@@ -208,10 +208,6 @@ class Fluid(eqx.Module):
             float(np.max(np.asarray(self.relaxation_time))) if self.law.linear_relaxation else None
         )
 
-    def rest(self) -> Float[Array, "k s"]:
-        """Return the state at rest."""
-        return jnp.tile(self.law.rest(), (self.n_modes, 1))
-
     def stress(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
     ) -> Float[Array, "4"]:

@@ -61,8 +61,8 @@ def close_loop(
     progress
         Called now and then with a line of text and about what fraction is done.
     **options
-        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` and
-        `loading` of `discover.loop.run_loop`.
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations` and `loading` as
+        in ``[loop]`` of a study; `laws`: names of laws to choose the base's from.
 
     Returns
     -------

@@ -25,10 +25,9 @@ from discover.loop.from_posterior import Ended, result_of
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Fold
 from discover.loop.preference import with_function_first, with_named_law_first
-from discover.loop.runs import MOST_SAMPLES
 from discover.loop.search_time import SearchTime
 from discover.loop.simple import simple_result
-from discover.loop.task import Say, Task
+from discover.loop.task import Task
 from discover.progress import Progress, by_time
 from discover.study.data import StudyData, temperature
 from discover.study.declared_model import StudyModel, forward_model
@@ -43,43 +42,24 @@ _OFF = 1e-30  # Factor on the moduli of a fluid that is switched off
 
 @in_one_thread
 def run_loop(
-    dataset: Dataset,
-    declared: DeclaredModel,
-    fit: Sequence[str] | None = None,
-    held_out: Sequence[str] = (),
-    effects: Sequence[str | AbstractEffect] | str | None = None,
-    max_effects: int = 3,
-    strain: tuple[float, float] | None = None,
-    noise: float | None = None,
-    most_samples: int = MOST_SAMPLES,
-    explanations: int = MOST_LISTED,
-    laws: Sequence[str] = (),
-    progress: Say | None = None,
-    loading: float | None = None,
-) -> LoopResult:
+    dataset: Dataset, declared: DeclaredModel, *, explanations: int = MOST_LISTED,
+    laws: Sequence[str] = (), **asked: Any,
+) -> LoopResult:  # fmt: skip
     """Find what a declared model lacks, add it, and test the result on held-out runs.
 
     Hypotheses are sets of effects added to the declared model, which is never exact: small
     instrument errors are fitted jointly. All are weighed by evidence and prior, unknown effects
     among them; see `discover.inference.engine`. Nothing is random.
 
-    `max_effects`, `strain`, `noise`, `most_samples`, `explanations` and `loading` are those of
-    `discover.study.schema.Loop`. `fit`, `held_out`: names of runs; by default all are fitted that
-    are not held out. `effects`: as in `candidates_of`. `most_samples`: evenly chosen; of a run with
-    little noise fewer, but no fewer than 150. `laws`: named laws to choose the declared one from,
-    by the fitted runs alone, each with its likeliest further effects. `loading`: the record of a
-    run is then a factor of its own times what the model predicts, with that deviation from one.
+    `explanations`: how many are listed. `laws`: named laws to choose the declared one from, by the
+    fitted runs alone, each with its likeliest further effects. `**asked`: as of `Task.of_runs`.
 
-    Raises InputError if runs, window or effects are not as they should be, or the model diverges in
-    the fitted runs.
+    Raises InputError as `Task.of_runs`, or if the model diverges in the fitted runs.
     """
     started = time.perf_counter()
-    task = Task.of_runs(
-        dataset, declared, fit, held_out, effects, max_effects, strain, noise, most_samples,
-        progress, loading,
-    )  # fmt: skip
+    task = Task.of_runs(dataset, declared, **asked)
     found = search(task, laws)
-    result = found.material() if max_effects else None
+    result = found.material() if task.most else None
     if result is None:
         found = found.with_curves()
         task.say("bands, intervals and the next test")

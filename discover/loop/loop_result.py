@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ from discover.loop import parts
 from discover.loop.answering import loop_answer
 from discover.loop.expected_errors import Spread
 from discover.loop.runs import RunRecord
-from discover.plain_numbers import json_text, plain
+from discover.plain_numbers import plain
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
 
@@ -280,10 +279,6 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
             **self._law(),
         }
         return plain(contents)
-
-    def write_json(self, path: str | Path) -> None:
-        """Write ``loop.json``."""
-        Path(path).write_text(json_text(self.to_json()), encoding="utf-8")
 
 
 def _numbers(record: RunRecord, time: float) -> tuple[float, float]:

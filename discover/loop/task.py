@@ -82,7 +82,14 @@ class Task:
         loading: float | None = None,
         computed: bool = False,
     ) -> "Task":
-        """Return the task that runs, model and candidates make; parameters as in `run_loop`."""
+        """Return the task that runs, model and candidates make.
+
+        `fit`, `held_out`: names of runs; by default all are fitted that are not held out.
+        `effects`: as in `candidates_of`. `max_effects`, `strain`, `noise`, `most_samples` and
+        `loading` are those of `discover.study.schema.Loop`; samples are evenly chosen, of a run
+        with little noise fewer, but no fewer than 150. `computed`: see above. Raises InputError if
+        runs, window or effects are not as they should be.
+        """
         if max_effects < 0:
             raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
         fitted, held, spikes = split_runs(dataset, fit, held_out, strain, most_samples)

@@ -128,9 +128,13 @@ def loop_result(*added, base=("giesekus", {"alpha": 0.1}), **more):
     )  # fmt: skip
 
 
+def write_loop(result, folder):
+    (folder / "loop.json").write_text(json.dumps(result.to_json()), encoding="utf-8")
+
+
 def test_a_loop_leaves_as_its_fluid_without_the_instrument(tmp_path):
     result = loop_result(("ptt_linear", 0.3), ("giesekus_mobility", 0.05), ("rate_gain", 0.1))
-    result.write_json(tmp_path / "loop.json")
+    write_loop(result, tmp_path)
     assert str(result.sympy()) == "0.3*Trace(sigma)*sigma + 0.15*sigma**2"
     assert result.latex() == result.equation().latex()
     content = json.loads(invoke("export", tmp_path, "--format", "json", code=0).stdout)
@@ -156,7 +160,7 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
     """Of a law that is no sum of terms, and of one that is."""
     for base in (("xpp", XPP), ("giesekus", {"alpha": 0.1})):
         differing = {"alpha": by_mode((0.1, 0.3))}
-        loop_result(base=base, declared_parameters=differing).write_json(tmp_path / "loop.json")
+        write_loop(loop_result(base=base, declared_parameters=differing), tmp_path)
         done = invoke("export", tmp_path, "--format", "rheotool", code=0)
         values = re.findall(r"alpha \[0 0 0 0 0 0 0\] (\S+);", done.stdout)
         assert [float(v) for v in values] == [0.1, 0.3]
@@ -175,7 +179,7 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
 def test_an_effect_by_mode_is_the_law_that_it_makes_in_rheotool(tmp_path, effect, entry, law):
     found = DeclaredEffect(effect, "constitutive", {"amplitude": by_mode((0.1, 0.3))})
     result = loop_result((effect, 0.1), base=("ucm", {}), declared_effects=(found,))
-    result.write_json(tmp_path / "loop.json")
+    write_loop(result, tmp_path)
     text = invoke("export", tmp_path, "--format", "rheotool").stdout
     values = re.findall(rf"{entry} \[0 0 0 0 0 0 0\] (\S+);", text)
     assert [float(v) for v in values] == pytest.approx([0.1, 0.3])
@@ -190,7 +194,7 @@ def test_a_constant_by_mode_ends_at_its_range_and_is_refused_beside_terms(tmp_pa
     named = loop_result(declared_parameters=differing).equation().named
     assert [one["alpha"] for one in named.constants] == [0.1, 1.0]
     effect = DeclaredEffect("giesekus_mobility", "constitutive", {"alpha": by_mode((0.1, 0.3))})
-    loop_result(declared_effects=(effect,)).write_json(tmp_path / "loop.json")
+    write_loop(loop_result(declared_effects=(effect,)), tmp_path)
     assert "giesekus_mobility differs" in invoke("export", tmp_path).stderr
 
 
@@ -201,7 +205,7 @@ def test_a_loop_whose_law_is_no_sum_of_terms_says_why(tmp_path, effect, said):
     result = loop_result((effect, 0.1, *([2.0] if effect == "thixotropy" else [])))
     result = replace(result, fluid=None) if effect == "thixotropy" else result
     assert said in result._repr_html_().replace("&#x27;", "'")
-    result.write_json(tmp_path / "loop.json")
+    write_loop(result, tmp_path)
     assert effect in invoke("export", tmp_path, code=2).stderr
 
 
@@ -209,7 +213,7 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
     found = loop_result(("thixotropy", 0.1, 2.0))
     part = StatePart("thixotropy", {"breakdown": 0.1, "build_up_time": 2.0})
     result = replace(found, fluid=None, fluid_at_mean=found.fluid, states=(part,))
-    result.write_json(tmp_path / "loop.json")
+    write_loop(result, tmp_path)
     text = invoke("export", tmp_path).stdout
     module = {}
     exec(text, module)
@@ -224,13 +228,13 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
 def test_the_nearest_classical_law_is_exported_in_place_of_the_answer(tmp_path):
     equation = loop_result(base=("giesekus", {"alpha": 0.137})).equation()
     near = NearestLaw("giesekus", {"alpha": StageParameter(0.1, (0.05, 0.2), "1")}, 0.12, equation)
-    replace(loop_result(("yield_stress", 0.1)), nearest_law=near).write_json(tmp_path / "loop.json")
+    write_loop(replace(loop_result(("yield_stress", 0.1)), nearest_law=near), tmp_path)
     said = json.loads((tmp_path / "loop.json").read_text())["nearest_law"]
     assert (said["law"], said["size"]) == ("giesekus", 0.12)
     assert said["constants"]["alpha"] == {"value": 0.1, "ci95": [0.05, 0.2], "unit": "1"}
     assert "0.137" in invoke("export", tmp_path, "--format", "python", code=0).stdout
     # negative control: without one the law that cannot be written out is refused
-    loop_result(("yield_stress", 0.1)).write_json(tmp_path / "loop.json")
+    write_loop(loop_result(("yield_stress", 0.1)), tmp_path)
     invoke("export", tmp_path, "--format", "python", code=2)
 
 

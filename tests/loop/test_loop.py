@@ -119,9 +119,8 @@ def test_a_planted_rise_time_is_found_or_its_declared_alias():
     assert result.verdict == "effects_added"
 
 
-def test_json_follows_the_contract_and_records_hold_what_pictures_need(planted_mobility, tmp_path):
-    planted_mobility.write_json(tmp_path / "loop.json")
-    contents = json.loads((tmp_path / "loop.json").read_text())
+def test_the_json_follows_the_contract_and_records_hold_what_pictures_need(planted_mobility):
+    contents = json.loads(json.dumps(planted_mobility.to_json(), allow_nan=False))
     wanted = {"verdict", "error_before", "error_after", "noise_floor", "stages", "remaining"}
     assert wanted <= set(contents)
     stage = contents["stages"][0]

@@ -122,8 +122,7 @@ class TensorSINDy(RunPrediction):
         self.coefficients_, self.inner_ = terms.over(library)
         self.law_ = law_of_terms(terms, known.law.linear_relaxation, law_below(known))
         self.fluid_ = replace(known, law=self.law_, modulus_covariance=None)
-        misfit, covariance = fitter.misfit(chosen), self.covariance_
-        rows = len(problem.fitted)
+        misfit, rows = fitter.misfit(chosen), len(problem.fitted)
         self.result_ = LearnerResult(
             learner="tensor_sindy",
             law=self.law_,
@@ -134,8 +133,6 @@ class TensorSINDy(RunPrediction):
                 "chosen": number,
                 "inclusion": report.inclusion(search),
                 "rivals": report.rival_table(search, chosen),
-                "covariance": None if covariance is None else covariance.tolist(),
-                "iterations": search.count,
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,

@@ -90,16 +90,13 @@ def path_table(
 ) -> list[dict[str, Any]]:
     """Return one row for each member of the path: support, size, misfits, log evidence.
 
-    ``held_out``: rms of the misfit over the runs left out; ``held_out_by_run``: each, by name.
+    ``held_out``: rms of the misfit over the runs left out.
     """
-    names = [run.name for run in search.fitter.rows.runs]
     rows = []
     for i, fit in enumerate(path):
         row = _described(search, fit)
         row["size"] = len(fit.names)
         row["held_out"] = None if held_out is None else float(rms(held_out[i]))
-        by_run = [] if held_out is None else held_out[i].tolist()
-        row["held_out_by_run"] = dict(zip(names, by_run, strict=False))
         rows.append(row)
     return rows
 

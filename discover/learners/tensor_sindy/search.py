@@ -125,7 +125,6 @@ class SupportSearch(Search):
         super().__init__(fitter, min(most, len(library)), say)
         self.library, self.optimizer = library, optimizer
         self.places = {name: i for i, name in enumerate(library.names)}
-        self.count = 0  # laws that were fitted and could be integrated
         self._models: dict[Key, LinearModel] = {}
 
     def support(self, fit: Fit) -> tuple[int, ...]:
@@ -155,9 +154,7 @@ class SupportSearch(Search):
     def add(self, starts: Iterable[Fit], wanted: int | None = None) -> list[Fit]:
         """Fit hypotheses side by side and keep them; of one set the likeliest."""
         require_wanted()
-        fits = super().add(starts, wanted)
-        self.count += sum(bool(np.isfinite(fit.log_posterior)) for fit in fits)
-        return fits
+        return super().add(starts, wanted)
 
     def run(self) -> "SupportSearch":
         """Find supports from the empty one on."""
