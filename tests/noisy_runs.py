@@ -7,6 +7,8 @@ from independent.noise import white
 
 import discover as dc
 
+THREE_DECADES = np.geomspace(0.1, 100.0, 31)
+
 
 def run_at(rate, times, stress, name="", **more):
     """Return a start-up of this record, called by its rate unless it has a name."""
@@ -18,6 +20,18 @@ def run_of_wave(amplitude, frequency, times, stress, name=""):
     """Return an oscillation of the rate from rest with this record."""
     flow, rates = dc.oscillatory_shear(amplitude, frequency), amplitude * np.cos(frequency * times)
     return dc.Run(name or f"{amplitude:g}_{frequency:g}", times, flow, rates, stress)
+
+
+def sweep(
+    modulus, time, solvent=0.0, elastic=0.0, noise=0.0, seed=0, inertia=0.0,
+    omega=THREE_DECADES,
+):  # fmt: skip
+    """Return a linear sweep of modes, a solvent, an elastic constant and inertia left in it."""
+    x = 1j * omega[:, None] * np.asarray(time)
+    moduli = (x / (1.0 + x)) @ np.asarray(modulus) + elastic
+    moduli = moduli + 1j * omega * solvent - inertia * omega**2
+    off = 1.0 + noise * np.random.default_rng(seed).standard_normal((2, len(omega)))
+    return dc.LinearSweep(omega, moduli.real * off[0], moduli.imag * off[1])
 
 
 def start_ups(law, rates, times, noise=0.01, seed=0, factor=1.0, names=None):

@@ -5,8 +5,9 @@ import pytest
 from independent import Giesekus, Modes
 from independent.sweeps import modulus_of
 from made_exports import write_files
+from noisy_runs import sweep as sweep_of
 
-from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
+from discover.dataset import LinearSweep, load_dataset, relaxation_spectrum
 from discover.dataset.checking.folder import check_folder
 from discover.dataset.checking.linear_theory import sweep_inertia
 from discover.errors import InputError
@@ -147,15 +148,10 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
     assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
 
 
-def sweep_of(modulus, relaxation_time, frequency):
-    truth = RelaxationSpectrum(np.asarray(modulus), np.asarray(relaxation_time), 0.0, 0.0)
-    return LinearSweep(frequency, *truth.moduli(frequency))
-
-
 def test_modes_reproduce_a_broad_sweep_may_be_counted_and_need_two_frequencies():
     frequency = np.geomspace(1e-3, 1e3, 61)
     times = np.geomspace(1e-3, 1e3, 7)
-    sweep = sweep_of(1e4 * times**-0.3, times, frequency)
+    sweep = sweep_of(1e4 * times**-0.3, times, omega=frequency)
     spectrum = relaxation_spectrum(sweep)
     storage, loss = spectrum.moduli(frequency)
     error = np.concatenate([storage / sweep.storage_modulus, loss / sweep.loss_modulus]) - 1
@@ -165,7 +161,7 @@ def test_modes_reproduce_a_broad_sweep_may_be_counted_and_need_two_frequencies()
     one = np.ones(1)
     with pytest.raises(InputError, match="at least 2 frequencies"):
         relaxation_spectrum(LinearSweep(one, one, one))
-    sweep = made(*MATERIALS["melt"], noise=0.01)
+    sweep = sweep_of(*MATERIALS["melt"], noise=0.01, seed=DRAW)
     assert [len(relaxation_spectrum(sweep, modes=count)) for count in (2, 4)] == [2, 4]
     with pytest.raises(InputError, match="modes must be from 1"):
         relaxation_spectrum(sweep, modes=0)
@@ -181,13 +177,8 @@ def test_the_melt_needs_a_dozen_modes_and_misses_its_sweep_by_under_4_percent(me
 @pytest.mark.parametrize("inertia", [0.0, 2e-3, -2e-3])
 def test_inertia_left_in_a_sweep_comes_back_with_its_sign(inertia):
     omega = np.geomspace(0.1, 100.0, 25)
-    x = omega[:, None] * np.array([0.1, 1.0])
-    modulus = np.array([40.0, 100.0])
-    generator = np.random.default_rng(0)
-    storage = (x**2 / (1 + x**2)) @ modulus - inertia * omega**2
-    loss = (x / (1 + x**2)) @ modulus
-    noisy = [v * (1 + 0.01 * generator.standard_normal(25)) for v in (storage, loss)]
-    found = sweep_inertia(LinearSweep(omega, *noisy))
+    left = sweep_of([40.0, 100.0], [0.1, 1.0], noise=0.01, inertia=inertia, omega=omega)
+    found = sweep_inertia(left)
     assert found.inertia == pytest.approx(inertia, abs=4 * found.deviation)
     assert (found.evidence > 6.0) == (inertia != 0.0)
     if inertia != 0.0:
@@ -268,21 +259,12 @@ def test_intervals_hold_at_a_strain_that_is_not_small_and_noise_widens_none(at_a
 def test_modes_too_few_leave_more_than_the_best_number_would():
     frequency = np.geomspace(1e-3, 1e3, 61)
     times = 1.3 * np.geomspace(1e-3, 1e3, 41) ** 0.97
-    found = relaxation_spectrum(sweep_of(1e4 * times**-0.3, times, frequency), modes=4)
+    found = relaxation_spectrum(sweep_of(1e4 * times**-0.3, times, omega=frequency), modes=4)
     assert len(found) == 4
     assert found.best_error < 0.1 * found.relative_error
 
 
-def made(modulus, time, solvent=0.0, elastic=0.0, noise=0.0, seed=0, inertia=0.0):
-    """Sweep of modes, a solvent and an elastic constant, written out here."""
-    omega, lot = np.geomspace(0.1, 100.0, 31), np.random.default_rng([seed, 62])
-    x = 1j * omega[:, None] * np.asarray(time)
-    moduli = (x / (1 + x)) @ np.asarray(modulus) + elastic + 1j * omega * solvent
-    moduli = moduli - inertia * omega**2
-    parts = (moduli.real, moduli.imag)
-    return LinearSweep(omega, *(v * (1 + noise * lot.standard_normal(31)) for v in parts))
-
-
+DRAW = (0, 62)
 MATERIALS = {
     "Oldroyd-B": ([50.0], [0.7], 0.4, 0.0),
     "Boger": ([2.0], [1.5], 5.0, 0.0),
@@ -297,7 +279,7 @@ MATERIALS = {
 @pytest.mark.parametrize("name", MATERIALS)
 def test_modes_solvent_and_elastic_constant_come_back_to_the_noise(name, noise):
     modulus, time, solvent, elastic = MATERIALS[name]
-    sweep = made(*MATERIALS[name], noise=noise)
+    sweep = sweep_of(*MATERIALS[name], noise=noise, seed=DRAW)
     found = relaxation_spectrum(sweep)
     # 62 values scatter by a tenth; a constant is a mode that errs by less than sweeps repeat to
     assert found.relative_error < max(1.3 * noise, 3e-4)
@@ -318,7 +300,7 @@ def test_modes_solvent_and_elastic_constant_come_back_to_the_noise(name, noise):
 
 @pytest.mark.parametrize("name", ["Oldroyd-B", "Zener"])
 def test_inertia_is_still_found_beside_a_solvent_or_an_elastic_constant(name):
-    sweep = made(*MATERIALS[name], noise=0.01, inertia=2e-3)
+    sweep = sweep_of(*MATERIALS[name], noise=0.01, seed=DRAW, inertia=2e-3)
     found = sweep_inertia(sweep)
     assert found.evidence > 6.0
     # a mode faster than the sweep rises with the square of the frequency too, so it is told roughly
@@ -326,7 +308,7 @@ def test_inertia_is_still_found_beside_a_solvent_or_an_elastic_constant(name):
 
 
 def test_a_declared_solvent_is_not_found_again_and_a_fluid_of_a_solid_says_so():
-    sweep = made(*MATERIALS["two modes"], noise=0.01)
+    sweep = sweep_of(*MATERIALS["two modes"], noise=0.01, seed=DRAW)
     held = relaxation_spectrum(sweep, solvent_viscosity=25.0)
     assert held.solvent_viscosity == 25.0
     assert len(held) == 2
@@ -334,7 +316,7 @@ def test_a_declared_solvent_is_not_found_again_and_a_fluid_of_a_solid_says_so():
     assert none.solvent_viscosity == 0.0
     assert none.relative_error < 0.02  # faster modes stand for it
     assert none.relaxation_time[0] < 0.01
-    sweep = made(*MATERIALS["Kelvin-Voigt"], noise=0.01)
+    sweep = sweep_of(*MATERIALS["Kelvin-Voigt"], noise=0.01, seed=DRAW)
     with pytest.warns(UserWarning, match="solid down to 0.1 rad/s"):
         fluid = Fluid.from_sweep(sweep)
     x = 1j * sweep.angular_frequency[:, None] * np.asarray(fluid.relaxation_time)
@@ -345,5 +327,7 @@ def test_a_declared_solvent_is_not_found_again_and_a_fluid_of_a_solid_says_so():
 
 
 def test_one_in_a_hundred_fluids_at_most_is_taken_for_a_solid():
-    fluids = (made([300.0, 20.0], [0.2, 3.0], noise=0.02, seed=seed) for seed in range(40))
+    fluids = (
+        sweep_of([300.0, 20.0], [0.2, 3.0], noise=0.02, seed=(seed, 62)) for seed in range(40)
+    )
     assert sum(bool(relaxation_spectrum(fluid).solid) for fluid in fluids) <= 1

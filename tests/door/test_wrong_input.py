@@ -107,6 +107,7 @@ def test_a_mistake_is_one_error_that_says_what_was_wanted(call, message):
 def test_settings_tables_and_calls_of_the_wrong_kind_are_refused_before_anything_is_fitted(learner):
     for settings, message in (
         ({"base": "ucm"}, "base must be a Fluid"),
+        ({"base": UCM}, r"base must be a Fluid.*Fluid\(law"),
         ({"random_state": -1}, "whole number, at least 0"),
         ({"random_state": 1.5}, "whole number, at least 0"),
         ({"progress": "loud"}, "progress must be a function"),
@@ -119,6 +120,12 @@ def test_settings_tables_and_calls_of_the_wrong_kind_are_refused_before_anything
     for table in (SAMPLES, SAMPLES[["time_s", "stress_Pa"]].to_numpy()):
         with pytest.raises(dc.InputError, match=f"{type(table).__name__} .*from_dataframe"):
             learner().fit(table)
+    for runs, message in (
+        (run(), r"fit\(\[run\]\)"),
+        *((wrong, "sequence of Run") for wrong in (None, "melt", 3.0)),
+    ):
+        with pytest.raises(dc.InputError, match=message):
+            learner().fit(runs)
 
 
 def test_errors_call_data_in_memory_by_its_name_and_half_a_character_is_one_of_them():

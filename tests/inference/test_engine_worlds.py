@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from independent.folders import write_folder
 from independent.instruments import Instrument
+from independent.noise import correlated
 from independent.worlds import MODULUS, TIME, draw_world
-from scipy.signal import lfilter
 
 import discover as dc
 from discover.forward import DeclaredModel
@@ -228,12 +228,10 @@ def test_what_all_runs_leave_alike_is_no_noise_and_what_each_leaves_is(tmp_path,
         kept = {n: getattr(runs[name], n)[::3] for n in ("time", "rate", "stress")}
         run = replace(runs[name], **kept)
         size, place = 0.05 * np.sqrt(np.mean(run.stress**2)), np.linspace(0.0, 1.0, len(run.time))
-        lot = np.random.default_rng([seed, i]).standard_normal(len(run.time))
-        decay = 0.95
-        slow = lfilter([1.0], [1.0, -decay], lot * np.append(1.0, np.full(39, 1 - decay**2)) ** 0.5)
         wave = np.sqrt(2.0) * np.cos(np.pi * (2.5 * place + 0.2 * seed))
         shapes[name] = replace(run, stress=run.stress + size * wave)
-        noises[name] = replace(run, stress=run.stress + size * slow)
+        slow = correlated(run.stress, 0.05, 0.95, np.random.default_rng([seed, i]))
+        noises[name] = replace(run, stress=slow)
     alike = explain(problem_of(tmp_path / "alike", shapes, FEW))
     assert alike.unexplained > 0.99
     own = explain(problem_of(tmp_path / "own", noises, FEW))

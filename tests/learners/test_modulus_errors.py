@@ -7,6 +7,7 @@ import pytest
 from independent import multimode_giesekus, start_up
 from independent.noise import white
 from noisy_runs import run_at
+from noisy_runs import sweep as sweep_of
 
 import discover as dc
 from discover.comparison import learning
@@ -39,13 +40,9 @@ def records(seed):
     return runs
 
 
-def sweep(seed, noise=SWEEP_NOISE):
-    generator, omega = np.random.default_rng(seed), np.geomspace(0.05, 100.0, 30)
-    x = omega[:, None] * TIME
-    off = 1.0 + noise * generator.standard_normal((2, omega.size))
-    return dc.LinearSweep(
-        omega, (x**2 / (1 + x**2)) @ MODULUS * off[0], (x / (1 + x**2)) @ MODULUS * off[1]
-    )
+def sweep(seed):
+    omega = np.geomspace(0.05, 100.0, 30)
+    return sweep_of(MODULUS, TIME, noise=SWEEP_NOISE, seed=seed, omega=omega)
 
 
 def test_the_covariance_of_moduli_is_their_scatter_over_repeated_sweeps():
@@ -65,9 +62,7 @@ def test_the_covariance_of_moduli_is_their_scatter_over_repeated_sweeps():
 
 
 def test_a_sweep_without_noise_of_its_own_modes_leaves_no_doubt_of_them():
-    omega = np.geomspace(0.1, 10.0, 9)
-    one = dc.LinearSweep(omega, omega**2 / (1 + omega**2), omega / (1 + omega**2))
-    spectrum = one.relaxation_spectrum()
+    spectrum = sweep_of([1.0], [1.0], omega=np.geomspace(0.1, 10.0, 9)).relaxation_spectrum()
     assert np.max(np.sqrt(np.diag(spectrum.modulus_covariance)) / spectrum.modulus) < 1e-6
     assert dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus_covariance is None
 

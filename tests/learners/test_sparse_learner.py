@@ -4,9 +4,8 @@ import numpy as np
 import pysindy
 import pytest
 from independent import multimode_giesekus
-from independent.noise import rms
+from independent.noise import correlated
 from noisy_runs import run_at, start_ups
-from scipy.signal import lfilter
 from shared_flows import LIBRARY
 
 import discover as dc
@@ -71,13 +70,8 @@ NOISE = 0.03
 def runs(correlation, seed):
     """Return start-ups of an upper-convected Maxwell fluid, whose σ12 is γ̇ (1 − e^−t)."""
     generator = np.random.default_rng([7, seed])
-    made = []
-    for rate in RATES:
-        exact = -rate * np.expm1(-TIMES)
-        innovation = generator.standard_normal(len(TIMES) + 100)
-        noise = lfilter([np.sqrt(1.0 - correlation**2)], [1.0, -correlation], innovation)[100:]
-        made.append(run_at(rate, TIMES, exact + NOISE * rms(exact) * noise))
-    return made
+    noisy = (correlated(-r * np.expm1(-TIMES), NOISE, correlation, generator) for r in RATES)
+    return [run_at(rate, TIMES, stress) for rate, stress in zip(RATES, noisy, strict=True)]
 
 
 def fitted(correlation, seed):

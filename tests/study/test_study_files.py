@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_exports import csv, write_runs
+from noisy_runs import THREE_DECADES, sweep
 
-from discover.dataset import Dataset, LinearSweep
+from discover.dataset import Dataset
 from discover.errors import InputError, problems_in
 from discover.laws import make_law
 from discover.study import RunFolder, fingerprint, parse_study, read_study
@@ -247,21 +248,13 @@ def test_laws_are_recognised_by_other_spellings(given, meant):
         make_law(given)
 
 
-OMEGA = np.geomspace(0.1, 100.0, 31)
 MODULUS, TIME, SOLVENT = np.array([6000.0, 1200.0]), np.array([0.08, 1.5]), 25.0
-
-
-def sweep(elastic=0.0):
-    x = 1j * OMEGA[:, None] * TIME
-    moduli = (x / (1 + x)) @ MODULUS + elastic + 1j * OMEGA * SOLVENT
-    lot = np.random.default_rng(5)
-    off = 1 + 0.01 * lot.standard_normal((2, len(OMEGA)))
-    return LinearSweep(OMEGA, moduli.real * off[0], moduli.imag * off[1])
 
 
 def declared(*lines, elastic=0.0):
     content = tomllib.loads("\n".join(["[data]", 'folder = "x"', "[model]", *lines]))
-    return declared_model(parse_study(content), Dataset("x", (), sweep(elastic)))
+    made = sweep(MODULUS, TIME, SOLVENT, elastic, noise=0.01, seed=5)
+    return declared_model(parse_study(content), Dataset("x", (), made))
 
 
 def test_undeclared_modes_are_the_sweeps_or_fitted_and_one_of_computed_data(tmp_path):
@@ -303,7 +296,7 @@ def test_a_solid_is_a_mode_that_does_not_relax_and_is_named():
     with pytest.warns(UserWarning, match="is a solid"):
         of_sweep = declared('modes = "lve"', elastic=5000.0)
     assert of_sweep.modulus[-1] == pytest.approx(5000.0, rel=0.05)
-    assert of_sweep.relaxation_time[-1] > 100.0 / OMEGA[0]
+    assert of_sweep.relaxation_time[-1] > 100.0 / THREE_DECADES[0]
     with pytest.warns(UserWarning, match="is a solid"):
         by_hand = declared("elastic_modulus_Pa = 40.0")
     assert by_hand.relaxation_time[-1] >= 1000.0
