@@ -115,14 +115,14 @@ class PeriodicSideBySide(StatePredictor):
 
     def _of_modes(self, asked: Asked, strain: Float[np.ndarray, "trials states"]) -> np.ndarray:
         """Return the complex moduli of the modes, shape (trials, states), each state a run."""
-        part, steps = asked.part, 2 * asked.part.steps.astype(np.int64)
+        part, steps = asked.part, asked.part.steps.astype(np.int64)
         frequency, most = part.frequency, int(np.max(steps))
         thetas = asked.thetas.copy()
         thetas[:, self._still] = 0.0
-        width = np.repeat((2.0 * np.pi / (frequency * steps))[:, None], most, axis=1)
-        phase = np.arange(2 * most + 1) * (np.pi / steps[:, None])
+        width = np.repeat((np.pi / (frequency * steps))[:, None], most, axis=1)
+        phase = np.arange(2 * most + 1) * (0.5 * np.pi / steps[:, None])
         wave = frequency[:, None] * np.cos(phase)
-        # of what is periodic the sum over a period is exact to all orders
+        # of what is periodic the sum over a period is exact to all orders, and over half of it here
         ends = np.arange(1, most + 1) <= steps[:, None]
         harmonic = np.where(ends, 2j * np.exp(-1j * phase[:, 2::2]), 0.0) / steps[:, None]
         packed = self._packed(asked.numbers, thetas, asked.moduli)
@@ -136,7 +136,7 @@ class PeriodicSideBySide(StatePredictor):
                 "width": width, "share": np.ones(width.shape), "period": 2.0 * np.pi / frequency,
                 "jump": np.zeros(len(steps)), "flow": flows_of(None),
             }  # fmt: skip
-            _, _, of_modes = self._code(0, used, given, normal=True)
+            _, _, of_modes = self._code(0, used, given, normal=True, mirrored=True)
             stress = np.where(ends[:, :, None], of_modes[:, 1:, 3], 0.0)
             return (np.sum(harmonic[:, :, None] * stress, axis=1) / amplitude).T
 
