@@ -31,6 +31,9 @@ _BESIDE = 10.0
 HOPELESS = 5e-4
 
 
+Arrays = Array | np.ndarray
+
+
 class Approximation(NamedTuple):
     """An approximation to the modes, and the best one of each that was tried.
 
@@ -61,10 +64,10 @@ def first_approximation(stress: Float[Array, "s k"], number: int = 0) -> Approxi
 
 def next_approximation(
     now: Approximation,
-    after: Float[Array, "s k"],
-    jacobian: Float[Array, "k s s"],
-    moved: Float[Array, ""] | float = 0.0,
-) -> tuple[Approximation, Bool[Array, " k"]]:
+    after: Float[Arrays, "s k"],
+    jacobian: Float[Arrays, "k s s"],
+    moved: Float[Arrays, "*k"] | float = 0.0,
+) -> tuple[Approximation, Bool[Arrays, " k"]]:
     """Return the next approximation, and of which modes this one was better than all before.
 
     A step that leads astray is shortened   [modified Newton method: Stoer & Bulirsch 2002,
@@ -110,8 +113,8 @@ def goes_on(
 
 
 def relative_change(
-    now: Approximation, following: Approximation, slowness: Float[Array, " k"], tolerance: float
-) -> Float[Array, " k"]:
+    now: Approximation, following: Approximation, slowness: Float[Arrays, " k"], tolerance: float
+) -> Float[Arrays, " k"]:
     """Return how far each mode moved, relative, but for what rounding moves of slow ones.
 
     `slowness`: relaxation time of each mode over that of a cycle. `tolerance`: ends the iteration.
@@ -121,7 +124,7 @@ def relative_change(
     return moved / told
 
 
-def _size(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
+def _size(stress: Float[Arrays, "s k"]) -> Float[Arrays, " k"]:
     return abs(stress).max(axis=0)
 
 
