@@ -142,10 +142,10 @@ class StressWeights(NamedTuple):
 
     def step(
         self,
-        stress: Float[Array, "s *k"],
-        remainder: Callable[[Float[Array, "s *k"], Any], Float[Array, "s *k"]],
+        stress: Float[Array, "s ..."],
+        remainder: Callable[[Float[Array, "s ..."], Any], Float[Array, "s ..."]],
         rates: Sequence[Any],
-    ) -> tuple[Float[Array, "s *k"], tuple[Float[Array, "s *k"], ...]]:
+    ) -> tuple[Float[Array, "s ..."], tuple[Float[Array, "s ..."], ...]]:
         """Return the stress after a step, and the remainders of its stages.
 
         `remainder`: of stress and rate, see there. `rates`: felt in each of the four stages.

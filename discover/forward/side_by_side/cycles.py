@@ -24,6 +24,9 @@ from discover.forward.steady_states import (
 # largest: what couples them would else show in those that are moved less
 _MOVED = 1e-7
 
+# Of the change before, up to which slopes found earlier serve on, and the change that ends
+_FAST, _ENDS = 0.1, 1e-10
+
 Levels = Float[np.ndarray, "runs levels lanes"]
 Modes = Float[np.ndarray, "runs k s lanes"]
 After = Callable[[Levels, Modes, Bool[np.ndarray, " runs"]], tuple[Levels, Modes]]
@@ -54,27 +57,30 @@ def periodic_starts(
     now = Approximation(row, row, np.inf * free, 0.0 * row, free, float(FROM_REST))
     alive = np.repeat(begins[:, None], lanes, axis=1)
     shift, change = np.zeros(alive.shape), np.full(alive.shape, np.inf)
+    stale, slopes = alive.copy(), np.zeros_like(levels)
+    jacobian = np.zeros((runs, k, lanes, s, s))
     while np.any(alive):
         modes = np.moveaxis(now.stress.reshape(s, runs, k, lanes), 0, -2)
         some = np.any(alive, axis=1)
         end_levels, end = after(levels, modes, some)
-        width = _MOVED * (1.0 + np.max(np.abs(modes), axis=(1, 2)))
-        tangents = []
-        for i in range(s):
-            moved = modes.copy()
-            moved[:, :, i] += width[:, None]
-            tangents.append((after(levels, moved, some)[1] - end) / width[:, None, None])
-        slopes = np.zeros_like(levels)
-        for own in effects:
-            moved, by = levels.copy(), _MOVED * (1.0 + np.abs(levels[:, own]))
-            moved[:, own] += by
-            slopes[:, own] = (after(moved, modes, some)[0] - end_levels)[:, own] / by
-        # of modes that are followed no longer nothing is asked
-        jacobian = np.moveaxis(np.stack(tangents), (1, 2, 4), (0, 1, 2))
-        jacobian = np.where(some[:, None, None, None, None], jacobian, 0.0).reshape(-1, s, s)
+        # slopes serve as long as they lead on fast   [the chord method]
+        if np.any(told := np.any(stale & alive, axis=1)):
+            width = _MOVED * (1.0 + np.max(np.abs(modes), axis=(1, 2)))
+            for i in range(s):
+                moved = modes.copy()
+                moved[:, :, i] += width[:, None]
+                tangent = (after(levels, moved, told)[1] - end) / width[:, None, None]
+                tangent, which = np.moveaxis(tangent, 2, -1), (stale & alive)[:, None, :, None]
+                jacobian[..., i, :] = np.where(which, tangent, jacobian[..., i, :])
+            for own in effects:
+                moved, by = levels.copy(), _MOVED * (1.0 + np.abs(levels[:, own]))
+                moved[:, own] += by
+                slope = (after(moved, modes, told)[0] - end_levels)[:, own] / by
+                slopes[:, own] = np.where((stale & alive)[:, None], slope, slopes[:, own])
         put_off = np.broadcast_to(shift[:, None], (runs, k, lanes)).ravel()
-        following, better = next_approximation(now, in_rows(end), jacobian, put_off)
-        moved = relative_change(now, following, slowness.ravel(), TOLERANCE)
+        asked = np.where(some[:, None, None, None, None], jacobian, 0.0).reshape(-1, s, s)
+        following, better = next_approximation(now, in_rows(end), asked, put_off)
+        moved = relative_change(now, following, slowness.ravel(), _ENDS)
         moved = np.max(np.where(better, moved, np.inf).reshape(runs, k, lanes), axis=1)
         hopeful = np.min(following.share.reshape(runs, k, lanes), axis=1) > HOPELESS
         hopeful &= following.number < MOST
@@ -89,8 +95,10 @@ def periodic_starts(
         largest = np.max(np.abs(step), axis=1, initial=0.0)
         largest = np.where(np.isfinite(largest), largest, np.inf)
         shift = np.where(alive, largest, shift)
-        change = np.where(alive, np.maximum(moved, largest), change)
+        moved = np.maximum(moved, largest)
+        stale = ~(moved < _FAST * change)
+        change = np.where(alive, moved, change)
         # what is no number goes on until there is no hope
-        alive &= ~(change < TOLERANCE) & (hopeful | (following.number <= FROM_REST))
+        alive &= ~(change < _ENDS) & (hopeful | (following.number <= FROM_REST))
     modes = np.moveaxis(now.stress.reshape(s, runs, k, lanes), 0, -2)
     return levels, np.where((change < TOLERANCE)[:, None, None], modes, np.nan)
