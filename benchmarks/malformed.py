@@ -52,7 +52,7 @@ def stopped_at_the_first_computation() -> Iterator[None]:
     def start(*_, **__):
         raise Started
 
-    bar = "discover.cli.study_commands.progress_bar"
+    bar = "discover.cli.app.progress_bar"
     with (
         patch(bar, lambda quiet: contextlib.nullcontext(report)),
         patch("discover.inference.engine.rows.make_batch", start),

@@ -96,10 +96,8 @@ class Dynamics(NamedTuple):
     def stepped(self, weights, stress, rates, flow: Kinematics | None):
         """Return the modes after a step of known weights; see `StressWeights.step`."""
         w = self.of_step(weights)
-        stage = self.stage(w, flow)
         first, middle, last = rates
-        felt = jnp.stack([first, middle, middle, last])
-        return w.step(stress, lambda state, rate: (stage(state, rate), ()), felt)[0]
+        return w.step(stress, self.stage(w, flow), (first, middle, middle, last))[0]
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa."""

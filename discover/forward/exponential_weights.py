@@ -1,9 +1,8 @@
 """Weights of a step that treats linear relaxation exactly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -143,21 +142,25 @@ class StressWeights(NamedTuple):
 
     def step(
         self,
-        stress: Float[Array, "s *c k"],
-        stage: Callable[[Float[Array, "s *c k"], Any], tuple[Float[Array, "s *c k"], Any]],
-        inputs: Any,
-    ) -> tuple[Float[Array, "s *c k"], Any]:
-        """Return the stress after a step, and what else each stage says.
+        stress: Float[Array, "s ..."],
+        remainder: Callable[[Float[Array, "s ..."], Any], Float[Array, "s ..."]],
+        rates: Sequence[Any],
+    ) -> tuple[Float[Array, "s ..."], tuple[Float[Array, "s ..."], ...]]:
+        """Return the stress after a step, and the remainders of its stages.
 
-        `stage`: from stress and its share of `inputs` to `remainder` and more.
+        `remainder`: of stress and rate, see there. `rates`: felt in each of the four stages.
         """
-        given = [jax.tree.map(lambda leaf, i=i: leaf[i], inputs) for i in range(4)]
-        n1, first = stage(stress, given[0])
-        n2, second = stage(self.second(stress, n1), given[1])
-        n3, third = stage(self.third(stress, n1, n2), given[2])
-        n4, fourth = stage(self.fourth(stress, n1, n3), given[3])
-        more = jax.tree.map(lambda *leaves: jnp.stack(leaves), first, second, third, fourth)
-        return self.end(stress, n1, n2, n3, n4), more
+        n1 = remainder(stress, rates[0])
+        n2 = remainder(self.second(stress, n1), rates[1])
+        n3 = remainder(self.third(stress, n1, n2), rates[2])
+        n4 = remainder(self.fourth(stress, n1, n3), rates[3])
+        return self.end(stress, n1, n2, n3, n4), (n1, n2, n3, n4)
+
+    def along_a_line(self, stress, remainder, middle, last):
+        """Return the stress in the middle of a step and after it, by the rates there."""
+        rates = (2.0 * middle - last, middle, middle, last)
+        after, remainders = self.step(stress, remainder, rates)
+        return self.middle(stress, *remainders), after
 
     def second(self, y, n1):
         """Return Y2, as `KrogstadWeights` does."""

@@ -1,10 +1,11 @@
 """Newton's steps towards states that a flow keeps: periodic ones, and steady ones of modes."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.forward.dynamics import Dynamics
@@ -27,7 +28,10 @@ _BESIDE = 10.0
 
 # Five steps in a row that led astray: of sixty laws at six strengths none came round later than
 # that, but for states at the very edge of those that there are
-_HOPELESS = 5e-4
+HOPELESS = 5e-4
+
+
+Arrays = Array | np.ndarray
 
 
 class Approximation(NamedTuple):
@@ -60,10 +64,10 @@ def first_approximation(stress: Float[Array, "s k"], number: int = 0) -> Approxi
 
 def next_approximation(
     now: Approximation,
-    after: Float[Array, "s k"],
-    jacobian: Float[Array, "k s s"],
-    moved: Float[Array, ""] | float = 0.0,
-) -> tuple[Approximation, Bool[Array, " k"]]:
+    after: Float[Arrays, "s k"],
+    jacobian: Float[Arrays, "k s s"],
+    moved: Float[Arrays, "*k"] | float = 0.0,
+) -> tuple[Approximation, Bool[Arrays, " k"]]:
     """Return the next approximation, and of which modes this one was better than all before.
 
     A step that leads astray is shortened   [modified Newton method: Stoer & Bulirsch 2002,
@@ -71,24 +75,27 @@ def next_approximation(
 
     `after`: what a cycle makes of the modes. `jacobian`: of that, for each mode: direction,
     component. `moved`: by how much something beside the modes has changed since, which puts them
-    off.
+    off. Arrays are JAX's or all NumPy's.
     """
+    of: Any = np if isinstance(after, np.ndarray) else jnp
     difference = after - now.stress
     misfit = _size(difference) / (1.0 + _size(now.stress))
     begins = now.number <= FROM_REST
     # never where it is not a number
     better = (misfit <= now.best_misfit + _BESIDE * moved) | (misfit < _EXACT)
-    better = better | (begins & jnp.isfinite(misfit))
-    matrix = jnp.eye(len(after)) - jnp.swapaxes(jacobian, 1, 2)
-    step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
-    step = jnp.where(now.number < FROM_REST, difference, step)
-    step = jnp.where(better, step, now.best_step)
-    best = jnp.where(better, now.stress, now.best)
-    share = jnp.where(better, 1.0, _SHORTER * now.share)
+    better = better | (begins & of.isfinite(misfit))
+    matrix = of.eye(len(after)) - jacobian.swapaxes(1, 2)
+    if of is np:  # which refuses to divide by nothing
+        matrix = np.where(np.linalg.det(matrix)[:, None, None] == 0.0, np.nan, matrix)
+    step = of.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
+    step = of.where(now.number < FROM_REST, difference, step)
+    step = of.where(better, step, now.best_step)
+    best = of.where(better, now.stress, now.best)
+    share = of.where(better, 1.0, _SHORTER * now.share)
     following = Approximation(
         stress=best + share * step,
         best=best,
-        best_misfit=jnp.where(better, misfit, now.best_misfit),
+        best_misfit=of.where(better, misfit, now.best_misfit),
         best_step=step,
         share=share,
         number=now.number + 1.0,
@@ -101,24 +108,24 @@ def goes_on(
 ) -> Bool[Array, ""]:
     """Return whether to go through another cycle."""
     begins = now.number <= FROM_REST
-    hopeful = (now.number < most) & (jnp.min(now.share) > _HOPELESS)
+    hopeful = (now.number < most) & (jnp.min(now.share) > HOPELESS)
     return begins | (hopeful & ~(change < tolerance))
 
 
 def relative_change(
-    now: Approximation, following: Approximation, slowness: Float[Array, " k"], tolerance: float
-) -> Float[Array, ""]:
-    """Return how far the modes moved, relative, but for what rounding moves of slow ones.
+    now: Approximation, following: Approximation, slowness: Float[Arrays, " k"], tolerance: float
+) -> Float[Arrays, " k"]:
+    """Return how far each mode moved, relative, but for what rounding moves of slow ones.
 
     `slowness`: relaxation time of each mode over that of a cycle. `tolerance`: ends the iteration.
     """
     told = 1.0 + _STATE_ROUNDING / tolerance * slowness
     moved = _size(following.stress - now.stress) / (1.0 + _size(now.stress))
-    return jnp.max(moved / told)
+    return moved / told
 
 
-def _size(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
-    return jnp.max(jnp.abs(stress), axis=0)
+def _size(stress: Float[Arrays, "s k"]) -> Float[Arrays, " k"]:
+    return abs(stress).max(axis=0)
 
 
 class _Iterate(NamedTuple):
@@ -152,7 +159,7 @@ def periodic_start(
         after, slopes = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(rest)))
         jacobian = jnp.moveaxis(slopes, 2, 0)  # mode, direction, component
         modes, better = next_approximation(now.modes, after, jacobian)
-        change = relative_change(now.modes, modes, slowness, TOLERANCE)
+        change = jnp.max(relative_change(now.modes, modes, slowness, TOLERANCE))
         change = jnp.where(is_periodic, jnp.where(jnp.all(better), change, jnp.inf), 0.0)
         return _Iterate(modes, change)
 

@@ -173,18 +173,9 @@ def answer_to_stress(
 
         def followed(fluid: Dynamics, rates):
             """Return what the balance misses at rates in the middle and at the end; the modes."""
-            middle, last = rates
-            of_fluid = fluid.stage(w, flow)
-
-            def stage(state, rate):
-                remainder = of_fluid(state, rate)
-                return remainder, remainder
-
-            in_stages = jnp.stack([2.0 * middle - last, middle, middle, last])
-            after, remainders = w.step(stress, stage, in_stages)
-            there = (w.middle(stress, *remainders), after)
+            there = w.along_a_line(stress, fluid.stage(w, flow), *rates)
             felt = jnp.stack([fluid.recorded(state, flow) for state in there])
-            return wanted - felt - dynamics.viscosity * rates, after
+            return wanted - felt - dynamics.viscosity * rates, there[1]
 
         # one of Newton's steps, with slopes that no derivative passes through
         rates = jax.lax.stop_gradient(before + bend * h * jnp.array([0.5, 1.0]))

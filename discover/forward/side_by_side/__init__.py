@@ -2,11 +2,10 @@
 
 from discover.forward.side_by_side.code import code_of
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.periodic import PeriodicSideBySide
 from discover.forward.side_by_side.predictors import Asked, MadeOnce
 from discover.forward.side_by_side.steady import SteadyCode, SteadySideBySide
 from discover.forward.side_by_side.stress import StressCode, StressSideBySide
-from discover.forward.side_by_side.transients import SideBySide
+from discover.forward.side_by_side.transients import PeriodicSideBySide, SideBySide
 
 __all__ = [
     "Asked",

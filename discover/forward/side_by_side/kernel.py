@@ -5,6 +5,7 @@ end.
 """
 
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,17 +13,17 @@ import numpy as np
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.code import as_array as _array
-from discover.forward.side_by_side.cycles import Cycles
+from discover.forward.side_by_side.cycles import periodic_starts
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
-_COUNTS = ("runs", "steps", "modes", "tabled", "normal")
+_COUNTS = ("runs", "steps", "modes", "tabled", "normal", "ends")
 # of all modes and lanes: rates, parameters and modes of each vector; and what is written
-_WIDE = ("rate", "shared", "mode", "stress", "felt", "of_modes", "scratch")
-_WHOLE = ("last", "pieces", "cycle", "flags", "taken")
-_SCALAR = ("width", "share", "period", "table", "flow", "jump")
+_WIDE = ("rate", "shared", "mode", "stress", "felt", "of_modes", "state", "scratch")
+_WHOLE = ("first", "last", "behind", "pieces", "flags", "taken")
+_SCALAR = ("width", "share", "table", "flow", "jump")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 
 # Where in the scratch array what stands; the last few, and the modes behind them, are the state
@@ -51,7 +52,7 @@ class Kernel(Code):
     def __init__(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None):
         super().__init__(fluid, found, flow)
         self.steps_taken = 0
-        self._times_at = self.flags.names.index("times")
+        self._times_at, self._states_at = map(self.flags.names.index, ("times", "states"))
         self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
@@ -65,32 +66,77 @@ class Kernel(Code):
         used: np.ndarray,
         given: dict[str, np.ndarray],
         normal: bool = False,
+        mirrored: bool = False,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return stress and felt rate at step ends, and the modes'.
 
         Shapes (runs, ends, lanes), NaN where none was computed; of the modes σ11, σ22, σ33, σ12
         and their structure variables, (runs, ends, s, lanes), empty unless `normal`. `tabled`:
         modes whose weights stand in the table. `used`: parts that a vector needs; see `Flags`.
+        `mirrored`: whether cycles are halves, after which the flow is its own image in the plane
+        across it.
         """
         (runs, steps), modes = given["width"].shape, len(given["mode"])
         stress = np.full((runs, steps + 1, LANES), np.nan)
-        felt, taken = np.zeros_like(stress), np.zeros(1, np.int64)
-        of_modes = np.full((*stress.shape[:2], self.size if normal else 0, LANES), np.nan)
+        felt = np.zeros_like(stress)
+        of_modes = np.full((runs, steps + 1, self.size if normal else 0, LANES), np.nan)
         of_modes[:, 0] = 0.0
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * self.size
-        # the state stands there twice: as it was before a piece, too
-        room = _STATE + 2 * (size - _STATE) + modes * self._kinds * WEIGHTS
-        room += Cycles.room(self._state_at - _LEVELS, modes, self.size)
-        scratch = np.empty((room, LANES))
-        arrays = given | {
-            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "taken": taken,
-            "of_modes": of_modes,
-        }  # fmt: skip
-        self._run((runs, steps, modes, tabled, int(normal)), arrays)
-        self.steps_taken += int(taken[0])
+        signs = np.ones((self.size, 1))
+        signs[3 : 4 * (1 + self._law.tensors) : 4] -= 2.0 * mirrored
+        last, (start, end) = given["last"], given["cycle"].T
+        begins = start >= 0
+
+        def follow(state, first, behind, records, ends=False) -> None:
+            """Follow runs from one step to another, and let `state` hold where that ends."""
+            # the state stands there twice: as it was before a piece, too
+            room = 2 * size - _STATE + modes * self._kinds * WEIGHTS
+            scratch, taken = np.empty((room, LANES)), np.zeros(1, np.int64)
+            arrays = given | {
+                "flags": flags, "scratch": scratch, "taken": taken, "state": state,
+                "first": first, "behind": behind, **records,
+            }  # fmt: skip
+            tells = int(normal and records is own)
+            self._run((runs, steps, modes, tabled, tells, int(ends)), arrays)
+            self.steps_taken += int(taken[0])
+
+        def after(levels, of_each, some):
+            """Return what a cycle makes of states and modes, of some of the runs."""
+            state = self._as_state(levels, of_each)
+            follow(state, start, np.where(some, end, start), nowhere)
+            levels, of_each = self._parts(state)
+            return levels, of_each * signs
+
+        own = {"stress": stress, "felt": felt, "of_modes": of_modes}
+        nowhere = {"stress": stress.copy(), "felt": felt.copy(), "of_modes": of_modes}
+        at_rest = [np.full((runs, count, LANES), rest) for count, rest in self._levels]
+        rest = np.concatenate([np.zeros((runs, 0, LANES)), *at_rest], axis=1)
+        still = np.zeros((runs, modes, self.size, LANES))
+        state, recorded = self._as_state(rest, still), np.where(begins, start, last)
+        follow(state, np.zeros_like(last), recorded, own, ends=not np.any(begins))
+        if np.any(begins):
+            slowness = given["mode"][:, 1] / given["period"][:, None, None]  # behind the modulus
+            places = np.cumsum([0, *(count for count, _ in self._levels)]).tolist()
+            effects = [slice(*ends) for ends in pairwise(places)] if used[self._states_at] else []
+            found = periodic_starts(after, rest, still, slowness, effects, begins)
+            state[begins] = self._as_state(*found)[begins]
+            if not mirrored:  # what gives way in series has come to its own by the end of a cycle
+                follow(state, start, np.where(begins, end, start), nowhere)
+            follow(state, recorded, last, own, ends=True)
         return stress, felt, of_modes
+
+    def _as_state(self, levels: np.ndarray, modes: np.ndarray) -> np.ndarray:
+        """Return the state that is carried from step to step, with nothing else in it."""
+        beside = np.zeros((len(levels), _LEVELS - _STATE, LANES))
+        flat = modes.reshape(len(modes), -1, LANES)
+        return np.concatenate([beside, levels, flat], axis=1)
+
+    def _parts(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return states of the fluid and modes."""
+        _, levels, flat = np.split(state, [_LEVELS - _STATE, self._state_at - _STATE], axis=1)
+        return levels, flat.reshape(len(state), -1, self.size, LANES)
 
     def _body(self) -> None:
         w = self._w
@@ -98,12 +144,8 @@ class Kernel(Code):
         self._parameters = self._shared.tree(first)
         self._on = self._truths()
         self._moves = w.builder.alloca(INTEGER)
-        modes = w.counts["modes"]
-        self._numbers = w.at((modes, self.size), (self._state_at - _STATE, 1))
+        self._numbers = w.at((w.counts["modes"], self.size), (self._state_at - _STATE, 1))
         self._weights_at = w.at((self._numbers, 2), (_STATE, 1))
-        room = w.at((self._weights_at, 1), (modes, self._kinds * WEIGHTS))
-        has_states = self._on["states"]
-        self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
         with w.loop(w.counts["runs"]) as run, self._arithmetic.apart():
             self._of_run(run)
 
@@ -111,46 +153,40 @@ class Kernel(Code):
         return self._arithmetic.splat(self._w.load(name, place))
 
     def _of_run(self, run) -> None:
-        w, counts = self._w, self._w.counts
-        size = self._flow.size
+        w, size = self._w, self._flow.size
         kinematics = [self._splat("flow", w.at((run, size), (i, 1))) for i in range(size)]
         flow = self._flow.tree(kinematics) if size else None
-        for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN):
-            self._keep(0.0, place)
-        self._rest(self._levels, _LEVELS)
-        states = w.at((counts["modes"], self.size))
-        with w.loop(states) as number:
-            self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
-        last = w.load("last", run)
-        start, end = (w.load("cycle", w.at((run, 2), (i, 1))) for i in range(2))
-        period = self._splat("period", run)
-        passes = self._cycles.passes(start, end, last, period, lambda: self._settle(flow))
-        with (
-            passes as (first, behind, is_run),
-            self._arithmetic.apart(),
-            w.loop(w.builder.sub(behind, first)) as number,
-            self._arithmetic.apart(),
-        ):
-            self._of_interval(run, w.at((number, 1), (first, 1)), flow, is_run)
-        self._at_start(run, flow)
-        with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
-            self._beside(run, number, flow)
+        state = w.at((run, self._numbers))
+        with w.loop(self._numbers) as number, self._arithmetic.apart():
+            held = w.load("state", w.at((state, 1), (number, 1)))
+            self._keep(held, w.at((number, 1), (_STATE, 1)))
+        self._settle(flow)
+        first, behind = w.load("first", run), w.load("behind", run)
+        with w.loop(w.builder.sub(behind, first)) as number, self._arithmetic.apart():
+            self._of_interval(run, w.at((number, 1), (first, 1)), flow)
+        with w.loop(self._numbers) as number, self._arithmetic.apart():
+            held = self._kept(w.at((number, 1), (_STATE, 1)))
+            w.store(held, "state", w.at((state, 1), (number, 1)))
+        ends = w.builder.icmp_signed("!=", w.counts["ends"], INTEGER(0))
+        with w.builder.if_then(ends), self._arithmetic.apart():
+            self._at_start(run, flow)
+            with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
+                self._beside(run, number, flow)
 
     def _settle(self, flow) -> None:
-        """Write what a step needs of modes that were not reached by a step before."""
+        """Write the stress of modes that were not reached by a step before."""
         w, add = self._w, self._arithmetic.add
-        for place in (_MISSING, _EARLIER, _TAKEN, _SHEARED):
+        for place in (_TAKEN, _SHEARED):
             self._keep(0.0, place)
         with w.loop(w.counts["modes"]) as number, self._arithmetic.apart():
             mode, at = self._tree("mode", self._of_mode, number), self._place_of_mode(number)
-            stress = self._kept(at, self.size)
-            sheared, _ = self._write(self._step.felt, mode, flow, stress)
+            sheared, _ = self._write(self._step.felt, mode, flow, self._kept(at, self.size))
             self._keep(add(self._kept(_SHEARED), sheared[()]), _SHEARED)
 
     def _place_of_mode(self, number) -> Any:
         return self._w.at((number, self.size), (self._state_at, 1))
 
-    def _of_interval(self, run, number, flow, is_run) -> None:
+    def _of_interval(self, run, number, flow) -> None:
         """Write a step in all its pieces, and what is recorded at its end."""
         w, b, a, steps = self._w, self._w.builder, self._arithmetic, self._w.counts["steps"]
         half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
@@ -183,15 +219,14 @@ class Kernel(Code):
             self._of_step(run, number, flow, own, width)
             if self._series:
                 is_first = b.icmp_signed("==", piece, INTEGER(0))
-                is_asked = b.and_(b.and_(self._on["series"], is_run), is_first)
-                with b.if_then(is_asked), a.apart():
+                with b.if_then(b.and_(self._on["series"], is_first)), a.apart():
                     self._record_taken(run, number)
             self._keep(end, _BEGIN)
             with b.if_then(may_end), a.apart():
                 left = a.divide(a.subtract(1.0, end), share)
                 some = a.in_some(a.compare(">", a.multiply(self._moved(), left), STEADY))
                 b.store(b.zext(some, INTEGER), self._moves)
-        self._record(run, number, is_run)
+        self._record(run, number)
 
     def _rate_at(self, way, rates) -> Any:
         """Return the rate on the way through a step: the parabola through both ends and middle."""
@@ -332,21 +367,18 @@ class Kernel(Code):
             weights = _array([a.chosen(own, *pair) for pair in zip(weights, table, strict=True)])
         return mode, weights, self._kept(at, self.size), at
 
-    def _record(self, run, number, is_run) -> None:
+    def _record(self, run, number) -> None:
         """Write the run's stress down."""
         w, builder, a = self._w, self._w.builder, self._arithmetic
-        with builder.if_then(is_run), a.apart():
-            steps, recorded, taken = w.counts["steps"], self._kept(_RECORDED), self._kept(_EARLIER)
-            at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
-            w.store(a.lanes(recorded), "stress", at)
-            w.store(a.lanes(taken), "felt", at)
-            with (
-                builder.if_then(builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))),
-                a.apart(),
-            ):
-                levels = self._states(self._levels, _LEVELS)
-                factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
-                self._record_modes(at, factor, self._state_at, self.size)
+        steps, recorded, taken = w.counts["steps"], self._kept(_RECORDED), self._kept(_EARLIER)
+        at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
+        w.store(a.lanes(recorded), "stress", at)
+        w.store(a.lanes(taken), "felt", at)
+        asked = builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))
+        with builder.if_then(asked), a.apart():
+            levels = self._states(self._levels, _LEVELS)
+            factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
+            self._record_modes(at, factor, self._state_at, self.size)
 
     def _record_taken(self, run, number) -> None:
         """Write what series elements take at the beginning of a step: the mean of both sides."""

@@ -60,22 +60,17 @@ class StressStep(Step):
     def answered(self, shared: Shared, mode: Mode, on, flow, slow, stress, rates, weights):
         """Return what a mode adds to the recorded stress halfway and at the end, and it there."""
         w = self._of_step(mode, weights)
-        middle, last = rates[0], rates[1]
 
         @jax.jit  # so that it is traced once, and not at each of the four stages
         def remainder(state, rate):
             return self._remainder(shared, mode, on, flow, w, slow, state, rate, slow)
 
-        n1 = remainder(stress, 2.0 * middle - last)
-        n2 = remainder(w.second(stress, n1), middle)
-        n3 = remainder(w.third(stress, n1, n2), middle)
-        n4 = remainder(w.fourth(stress, n1, n3), last)
-        after = w.end(stress, n1, n2, n3, n4)
+        there = w.along_a_line(stress, remainder, rates[0], rates[1])
         recorded = [
             mode.modulus * (at[3] if flow is None else contracted(flow.recorded, at[:4]))
-            for at in (w.middle(stress, n1, n2, n3, n4), after)
+            for at in there
         ]
-        return jnp.stack(recorded), after
+        return jnp.stack(recorded), there[1]
 
     def stiff(self, shared: Shared, mode: Mode, on, flow, slow, stress, rates, weights):
         """Return the same of a mode halfway and at the end, and the slopes of both by each rate."""
