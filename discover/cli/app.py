@@ -166,4 +166,7 @@ def main() -> None:
     # tracing makes millions of small objects that stay, and each full collection walks all of them
     gc.set_threshold(100_000, 50, 100)
     with obeying_interrupts():
-        app(prog_name="discover")
+        try:
+            app(prog_name="discover")
+        finally:
+            gc.freeze()  # else Python looks through all of them once more before it ends

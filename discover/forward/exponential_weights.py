@@ -21,7 +21,7 @@ def phi_functions(z: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     of: Any = np if isinstance(z, np.ndarray) else jnp
     small = of.abs(z) < 1.0
     safe = of.where(small, 1.0, z)
-    first = (of.exp(z) - 1.0) / safe
+    first = of.expm1(safe) / safe
     second = (first - 1.0) / safe
     third = (second - 0.5) / safe
     near = of.where(small, z, 0.0)

@@ -18,7 +18,9 @@ from jaxtyping import Array, Bool, Float, Key
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude import variational
 from discover.learners.tbnn_ude.least_squares import cloud_of, law_misfit, relative_misses
-from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.problem import Records, TrainingProblem
+from discover.learners.tbnn_ude.session import constant_scale
+from discover.programs import compiled
 from discover.statistics import independent_samples
 
 
@@ -48,6 +50,7 @@ def surprises(
     return found
 
 
+@compiled
 def at_twice_the_rate(problem: TrainingProblem) -> TrainingProblem:
     """Return the problem with its flows at twice the rate."""
     twice = problem.flows.faster(jnp.full(len(problem.flows), 2.0))
@@ -102,19 +105,21 @@ def _told(
     return float(weights @ weights + np.sum(np.log1p(np.clip(values, 0.0, None))))
 
 
+_linearised = compiled(Records.linearised)
+
+
 def _sensitivities(
     law: TensorBasisNetwork, along: variational.Along, problem: TrainingProblem
 ) -> tuple[variational.Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
     """Return the weights of a law, which of them act, and their derivatives of the residuals."""
     cloud = cloud_of(along, problem)
-    size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
     moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
     varies = np.any(np.asarray(law.network_mask) > 0)
     make = variational.Rebuild.with_network if varies else variational.Rebuild.of_constants
-    rebuild = make(law, moving, 1.0 / jnp.maximum(size, 1e-6))
+    rebuild = make(law, moving, constant_scale(cloud))
     _, jacobian = variational.side_by_side(rebuild.start, rebuild, problem)
     acts = np.asarray(rebuild.moves)
-    _, columns = problem.records.linearised(along.recorded, jacobian)
+    _, columns = _linearised(problem.records, along.recorded, jacobian)
     return rebuild, acts, np.asarray(columns)[..., acts].reshape(-1, int(np.sum(acts)))
 
 

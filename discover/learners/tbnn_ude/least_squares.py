@@ -124,8 +124,8 @@ def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:
 
     Amounts are penalised 1e-5 times as much: only where the data say nothing of them.
     """
-    every = strength * jnp.ones(N_COEFFICIENTS)
-    return PriorWeights(1e-5 * every, every)
+    every = np.full(N_COEFFICIENTS, strength)
+    return PriorWeights(on_device(1e-5 * every), on_device(every))
 
 
 _PATIENCE = 4

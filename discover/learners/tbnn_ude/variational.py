@@ -105,9 +105,9 @@ class Rebuild(eqx.Module):
         of_network = np.ones(positions.size - N_COEFFICIENTS)
         return cls(
             law,
-            jnp.asarray(positions),
-            jnp.concatenate([jnp.asarray(of_network, bool), jnp.asarray(moving)]),
-            jnp.concatenate([jnp.asarray(of_network), jnp.asarray(scale)]),
+            on_device(positions),
+            on_device(np.append(of_network > 0, moving)),
+            on_device(np.append(of_network, scale)),
         )
 
     @property
