@@ -250,8 +250,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData, sound: Mapping[str, Run]
     if exact is not None:
         reference = columns_of(recorded_and_normal(run.protocol, exact[run.name].components))
     else:
-        # in extension the tensile stress, in creep the strain
-        reference: dict[str, np.ndarray] = {"sigma12": run.recorded}
+        reference: dict[str, np.ndarray] = {"sigma12": run.recorded}  # in creep the strain
         for own in map(run.observing, run.beside):
             if own.name in sound:
                 there = np.isin(own.time, sound[own.name].time)

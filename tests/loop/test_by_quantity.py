@@ -382,9 +382,9 @@ def test_runs_at_two_temperatures_that_nobody_shifted_are_to_be_fitted_apart():
         replace(one, temperature_C=at) for one, at in zip(FITTED[:2], (160.0, 140.0), strict=True)
     )
     found = result([hot, cold])
-    assert what_to_measure_next(found).startswith("Fit the runs of one temperature")
+    assert what_to_measure_next(found).startswith("Fit runs of one temperature")
     found.records = [hot, replace(cold, temperature_C=160.0)]
-    assert not what_to_measure_next(found).startswith("Fit the runs of one temperature")
+    assert not what_to_measure_next(found).startswith("Fit runs of one temperature")
 
 
 def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():
