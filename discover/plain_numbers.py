@@ -55,15 +55,6 @@ def short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def rounded(content: Any) -> Any:
-    """Return numbers, also in lists and tables, with twelve digits, free of rounding."""
-    if isinstance(content, Mapping):
-        return {key: rounded(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return type(content)(map(rounded, content))
-    return float(f"{content:.12g}") if isinstance(content, float) else content
-
-
 def _are_integers(given: np.ndarray) -> bool:
     """Return whether all are integers, which NumPy keeps as objects where they are huge."""
     return all(isinstance(one, int) and not isinstance(one, bool) for one in given.ravel())

@@ -206,14 +206,13 @@ def comparison_flows(
     """
     sound = {run.name: run for run in data.dataset.quantity_by_quantity()}
     flows = []
-    parts: tuple[tuple[FlowKind, Dataset], ...] = (
-        ("training", data.fit), ("held_out", data.held_out)
+    kinds: tuple[tuple[FlowKind, Dataset, Dataset], ...] = (
+        ("training", data.fit, data.held_out), ("held_out", data.held_out, data.fit)
     )  # fmt: skip
-    for kind, part in parts:
-        normal = {one.name for run in part for one in _beside(run)}
-        other = {run.name for _, runs in parts if runs is not part for run in runs}
-        known = {name: run for name, run in sound.items() if name not in other}
-        flows += [run_flow(run, kind, data, known) for run in part if run.name not in normal]
+    for kind, part, other in kinds:
+        known = {name: run for name, run in sound.items() if name not in other.names}
+        there = {f"{run.name} ({one})" for run in part for one in run.beside}
+        flows += [run_flow(run, kind, data, known) for run in part if run.name not in there]
     truth = data.truth
     if truth is None:
         return flows
@@ -241,11 +240,6 @@ def _late_cycle(deborah: float, samples: int = 121) -> Float[np.ndarray, " n"]:
     return np.concatenate([[0.0], start + np.linspace(0.0, period, samples)])
 
 
-def _beside(run: Run) -> list[Run]:
-    """Return N1 and N2 that a run recorded, as records of their own."""
-    return [run.observing(quantity) for quantity in run.beside]
-
-
 def run_flow(run: Run, kind: FlowKind, data: StudyData, sound: Mapping[str, Run]) -> Flow:
     """Return the flow of a run of the data set.
 
@@ -256,9 +250,8 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData, sound: Mapping[str, Run]
     if exact is not None:
         reference = columns_of(recorded_and_normal(run.protocol, exact[run.name].components))
     else:
-        # in extension the tensile stress, in creep the strain
-        reference: dict[str, np.ndarray] = {"sigma12": run.recorded}
-        for own in _beside(run):
+        reference: dict[str, np.ndarray] = {"sigma12": run.recorded}  # in creep the strain
+        for own in map(run.observing, run.beside):
             if own.name in sound:
                 there = np.isin(own.time, sound[own.name].time)
                 reference[own.quantity] = np.where(there, own.recorded, np.nan)

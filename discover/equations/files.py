@@ -1,6 +1,7 @@
 """Laws in files: JSON, from which all other formats are made, and folders of results."""
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -234,8 +235,10 @@ def write_equation(
         equation = replace(equation, notes=(*equation.notes, *notes))
     options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
     given = {name: value for name, value in options.items() if value is not None}
-    if form == "rheotool":
-        return rheotool_text(equation, **given)
-    if given:
+    if form == "json":
+        return FORMATS[form](equation)
+    if given and form != "rheotool":
         raise InputError(f"Density and tolerance are for --format rheotool; got --format {form}.")
-    return FORMATS[form](equation)
+    text = FORMATS[form](equation) if form != "rheotool" else rheotool_text(equation, **given)
+    # 0.2999999999999975 is 0.3: twelve digits are free of rounding
+    return re.sub(r"\d+\.\d{10,}(e-?\d+)?", lambda one: repr(float(f"{float(one[0]):.12g}")), text)

@@ -24,7 +24,7 @@ from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
 from discover.loop.from_posterior import Ended
 from discover.loop.loop import without_fluid
-from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs, unfitted_runs
 from discover.plain_numbers import as_number, as_whole_number
 from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model, linear_start
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
@@ -159,6 +159,7 @@ def fit(
         {name: value for name, value in fixed.items() if name in LAWS[law].parameters},
         data.name, tolerance,
         temperature_of(fitted),
+        tuple(ended.records_of_unfitted(unfitted_runs(whole, [*fitted, *held]))),
     )  # fmt: skip
 
 

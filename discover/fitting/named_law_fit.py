@@ -54,6 +54,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     title: str = ""
     tolerance: float = TOLERANCE
     temperature_C: float | None = None
+    unfitted: tuple[RunRecord, ...] = ()  # N1 and N2 that the runs recorded as well
 
     _page: ClassVar[str] = "discover.report.in_memory:fit_page"
 
@@ -111,7 +112,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         """The law with its constants, how well it describes the runs, and where."""
         equation = self.written and self.equation()
         law = LAWS[self.law]
-        expected = {name: of_records(self.records, name, self.noise) for name in QUANTITIES}
+        records = (*self.records, *self.unfitted)
+        expected = {name: of_records(records, name, self.noise) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
         answer = Answer(
             law.title,

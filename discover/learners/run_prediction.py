@@ -110,14 +110,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         """Law, how well it describes the fitted runs, and which terms are determined."""
         terms = self.result_.terms
         law = spell({term.term: term.coefficient for term in terms}) if terms else "no term"
-        assumed = (
-            ""
-            if self.base is not None
-            else (
-                " Taken as known, as no base was given: upper-convected Maxwell, G = 1 Pa, λ = 1 s."
-            )
-        )
-        said = [f"h = {law}.{assumed}"]
+        said = [f"h = {law}."]
+        if self.base is None:
+            said.append("No base was given: upper-convected Maxwell, G = 1 Pa, λ = 1 s is assumed.")
         left = self.lack_of_fit_
         if left is not None:
             said.append(left.described)

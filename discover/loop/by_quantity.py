@@ -187,6 +187,8 @@ def of_stress(result: Any) -> ExpectedError:
         inside = beyond_noise(result.error_after.fit, result.noise_floor)
         return ExpectedError(inside, beyond, at, note=_FITTED, is_residual=True)
     note = counted(len(errors), "unseen run") if errors else ""
+    if inside is None and not own.is_residual:  # of runs of which something else was fitted
+        inside, note = own.inside, own.note
     return ExpectedError(inside, beyond, at, note=note, spread=spread)
 
 

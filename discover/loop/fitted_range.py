@@ -106,9 +106,9 @@ def _test(record: RunRecord) -> str:
         return "creep"
     rates = record.rate * np.sign(record.rate[-1])
     one = np.percentile(rates, 5.0) >= _SAME * record.fastest
-    if before:
-        return "cessation" if one and record.fastest <= _AT_REST * abs(before) else "steps of rate"
-    return "start-up" if one else "steps of rate"
+    if one and not before:
+        return "start-up"
+    return "cessation" if one and record.fastest <= _AT_REST * abs(before) else "steps of rate"
 
 
 def described(record: RunRecord) -> str:

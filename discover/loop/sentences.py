@@ -90,10 +90,7 @@ def what_to_measure_next(result: Any) -> str:
             return f"To confirm {words.effect_title(own[0].effect)}, {_as_clause(own[0].check)}."
         fitted = [record for record in result.records if not record.held_out]
         if len({one.temperature_C for one in fitted} - {None}) > 1 and not by_temperature(fitted):
-            return (
-                "Fit the runs of one temperature ([data] fit), or shift their times to one ([data] "
-                "clock_factor)."
-            )
+            return "Fit runs of one temperature, or shift their times to one (clock_factor)."
         return _of_another_stress(result) or _by_geometry(result)
     # the stage to confirm first: one with aliases before one without
     with_aliases = [stage for stage in result.stages if stage.aliases]

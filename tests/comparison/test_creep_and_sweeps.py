@@ -204,5 +204,6 @@ def test_a_flow_curve_alone_gives_a_law_and_leaves_its_second_normal_stress_open
 def test_an_instrument_is_not_taken_out_of_creep():
     data = dc.Dataset("planted", (creep(GIESEKUS, 40.0),))
     effects = known_effects({"stress_gain": {"gain_error": 0.1}})
+    divided, ended = StudyData(data, data, data.select([])), object.__new__(Ended)
     with pytest.raises(InputError, match=r"takes effects of an instrument \(stress_gain\)"):
-        without_instrument(StudyData(data, data, data.select([])), object.__new__(Ended), effects)
+        without_instrument(divided, ended, effects, np.zeros(1))

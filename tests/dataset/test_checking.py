@@ -174,38 +174,8 @@ def test_a_large_normal_force_on_a_slow_run_is_held_against_second_order(folder)
     assert any("between 0 and 2 Pa" in f.text for f in findings)
 
 
-def thinning(rate):
-    """A start-up whose steady stress is |G*| at the rate, with N1 over Laun's rule as given."""
-    x = rate * RELAXATION_TIME
-    storage, loss = MODULUS * x**2 / (1 + x**2), MODULUS * x / (1 + x**2)
-    rise = -np.expm1(-TIMES * max(rate, 1.0))
-    return (
-        {
-            "time_s": TIMES,
-            "shear_rate_1_s": np.full(len(TIMES), rate),
-            "stress_Pa": np.hypot(storage, loss) * rise,
-        },
-        2 * storage * (1 + (storage / loss) ** 2) ** 0.7 * rise**3,
-    )
-
-
-def test_a_normal_stress_far_above_the_frequency_of_one_mode_is_not_held_against_laun(folder):
-    # G′/G″ = λγ̇ = 40, which no melt of Laun's had: his rule has some 90 times as much
-    run, rule = thinning(20.0)
-    findings = check_folder(folder(run | {"N1_Pa": 4.0 * run["stress_Pa"]}, sweep=sweep_table(30)))
-    assert rule[-1] > 50.0 * 4.0 * run["stress_Pa"][-1]
-    assert not any("Laun's rule" in f.text for f in findings)
-
-
-@pytest.mark.parametrize(("factor", "doubted"), [(1.0, False), (0.6, False), (0.1, True)])
-def test_a_steady_n1_is_held_against_laun_where_cox_and_merz_hold(folder, factor, doubted):
-    run, normal = thinning(2.0)
-    findings = check_folder(folder({**run, "N1_Pa": factor * normal}))
-    assert any("Laun's rule" in f.text for f in findings) is doubted
-
-
-def test_the_normal_stress_of_a_giesekus_fluid_of_one_mode_is_not_held_against_laun(folder):
-    # At α = 0.4 and G′/G″ = λγ̇ = 4 it follows Cox and Merz within 2 % at 0.27 of Laun's N1
+def test_the_normal_stress_of_a_giesekus_fluid_of_one_mode_is_not_doubted(folder):
+    # At α = 0.4 and G′/G″ = λγ̇ = 4 it follows Cox and Merz within 2 %, with a quarter of Laun's N1
     rate, fluid = 4.0 / RELAXATION_TIME, GiesekusFluid((MODULUS,), (RELAXATION_TIME,), 0.4)
     stress = fluid.stress("shear", lambda _: rate, TIMES[1:])
     run = {
@@ -213,7 +183,7 @@ def test_the_normal_stress_of_a_giesekus_fluid_of_one_mode_is_not_held_against_l
         "stress_Pa": stress[:, 0, 1], "N1_Pa": stress[:, 0, 0] - stress[:, 1, 1],
     }  # fmt: skip
     findings = check_folder(folder(run, sweep=sweep_table(30)))
-    assert not any("Laun's rule" in f.text for f in findings)
+    assert not any("N1" in f.text for f in findings)
 
 
 def test_a_normal_stress_that_no_fluid_has_is_neither_fitted_nor_judges(folder):

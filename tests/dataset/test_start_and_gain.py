@@ -236,7 +236,7 @@ def measured(rate, fluid=(0.3, 0.0), seed=0, change=lambda time, normal: normal)
 
 def test_nothing_is_said_of_a_sound_normal_stress_with_two_per_cent_noise():
     runs = [measured(r, f, seed) for r in RATES for f in FLUIDS for seed in range(8)]
-    doubted = [run for run in runs if list(doubts_of_normal_stress(run, None, None))]
+    doubted = [run for run in runs if list(doubts_of_normal_stress(run, None))]
     # five false alarms in 432 other such records: of 144 more than four are one case in fifty
     assert len(doubted) <= 4
 
@@ -252,7 +252,7 @@ WRONG = {
 @pytest.mark.parametrize("rate", [1.0, 3.0])
 def test_a_normal_stress_that_lags_or_has_an_offset_is_wrong_early_and_kept_later(rate, fault):
     run = measured(rate, change=WRONG[fault])
-    (doubt,) = doubts_of_normal_stress(run, None, None)
+    (doubt,) = doubts_of_normal_stress(run, None)
     assert "cannot be right early" in doubt.text
     late, never = sound_normal_stress([run], None)
     assert not never

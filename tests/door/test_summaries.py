@@ -38,7 +38,7 @@ def test_a_library_without_the_law_finds_no_term_and_equation_table_and_json_hav
         assert "the rest is systematic" in said
         assert "No term is determined" in said
     assert wrong.score(wrong.runs_) > 0.9  # which came without a word
-    assert "no base was given: upper-convected Maxwell, G = 1 Pa, λ = 1 s" in wrong.text
+    assert "No base was given: upper-convected Maxwell, G = 1 Pa, λ = 1 s" in wrong.text
     assert len(wrong.terms_) == 3
     assert not wrong.summary()["determined"].str.startswith("yes").any()
     assert wrong.lack_of_fit_.verdict == "unexplained"

@@ -2,6 +2,7 @@
 
 import json
 import runpy
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -200,3 +201,15 @@ def test_constants_are_those_of_the_temperature_of_the_runs(measured_at, said):
     found = dc.fit("giesekus", data_of(giesekus_start_up, (0.5, 2.0), runs=runs))
     assert found.use["temperature_C"] == said
     assert ("at 25 °C" in found.text) is (said is not None)
+
+
+def test_n1_that_runs_recorded_and_the_fit_did_not_see_is_compared(data):
+    def with_n1(run, factor):
+        normal = Giesekus(MOBILITY, MODULUS, TIME).respond(start_up(run.rate[0]), run.time).N1
+        return replace(run, first_normal_stress_difference=factor * normal)
+
+    for factor, missed in ((1.0, 0.0), (0.8, 0.25)):
+        runs = tuple(with_n1(run, factor) for run in data)
+        found = dc.fit("giesekus", dc.Dataset("both", runs))
+        # a law that misses by (1 − f)/f of the record; α by 2 % of N1
+        assert found.use["expected_error"]["N1"] == pytest.approx(missed, abs=0.02)

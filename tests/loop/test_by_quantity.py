@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.loop.answering import _constants, shows_a_derivative
-from discover.loop.by_quantity import errors_by_quantity, with_unseen
+from discover.loop.by_quantity import beyond_noise, errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread, steady_shear
 from discover.loop.fitted_range import described, range_of
 from discover.loop.from_posterior import Ended
@@ -131,6 +131,16 @@ def test_each_quantity_has_the_error_of_its_own_unseen_runs_and_fitted_ones_a_re
     moduli = [record(name, 0.1, 0.1, quantity=name) for name in ("storage_modulus", "loss_modulus")]
     swept = result(moduli, left_out={"storage_modulus": 0.1, "loss_modulus": 0.3})
     assert errors_by_quantity(swept)["sigma12"].inside == pytest.approx(0.2)  # they are of σ12
+
+
+def test_the_stress_of_runs_of_which_n1_alone_was_fitted_is_measured():
+    normal = [replace(one, name=f"{one.name} (N1)", quantity="N1") for one in FITTED]
+    judged = [replace(one, held_out=True) for one in FITTED]
+    told = errors_by_quantity(result([*normal, *judged]))["sigma12"]
+    assert told.inside == pytest.approx(
+        np.mean([beyond_noise(e, NOISE) for e in (0.02, 0.03, 0.05)])
+    )
+    assert "not fitted" in told.note
 
 
 def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
@@ -374,9 +384,9 @@ def test_runs_at_two_temperatures_that_nobody_shifted_are_to_be_fitted_apart():
         replace(one, temperature_C=at) for one, at in zip(FITTED[:2], (160.0, 140.0), strict=True)
     )
     found = result([hot, cold])
-    assert what_to_measure_next(found).startswith("Fit the runs of one temperature")
+    assert what_to_measure_next(found).startswith("Fit runs of one temperature")
     found.records = [hot, replace(cold, temperature_C=160.0)]
-    assert not what_to_measure_next(found).startswith("Fit the runs of one temperature")
+    assert not what_to_measure_next(found).startswith("Fit runs of one temperature")
 
 
 def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():

@@ -81,7 +81,7 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
     transients = [run for run in runs if run.protocol.control == "rate"]
     for run in transients:
         findings += start_up.doubts_of_start(run, sweep, spectrum)
-        findings += start_up.doubts_of_normal_stress(run, sweep, spectrum)
+        findings += start_up.doubts_of_normal_stress(run, spectrum)
     findings += linear_theory.against_linear_theory(transients, sweep, spectrum)
     if clock_factor is None and not _shift_columns(index):
         findings += run_checks.doubts_of_temperature(runs)

@@ -32,9 +32,6 @@ _FEWEST_LEFT = 10
 # Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number, and of what it
 # predicts a modulus and a time that are off leave this factor open
 _SLOW, _SECOND_ORDER_FACTOR = 0.3, 3.0
-# Laun's rule is one of experience with melts, and holds to some ten per cent where Cox's and Merz's
-# does; a Giesekus fluid of one mode follows Cox's and Merz's with a fifth of it at this ratio
-_COX_MERZ, _LAUN_LIMITS, _LARGEST_RATIO = 1.15, (0.2, 2.0), 5.0
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25
@@ -51,11 +48,9 @@ _HARMONICS = np.array([1, 2, 3, 5, 7])
 Values = Float[np.ndarray, " n"]
 
 
-def doubts_of_normal_stress(
-    run: Run, sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
-) -> Iterator[Finding]:
+def doubts_of_normal_stress(run: Run, spectrum: RelaxationSpectrum | None) -> Iterator[Finding]:
     """Doubts about the N1 of a start-up of shear; nothing of any other run."""
-    for fault in _faults(run, sweep, spectrum):
+    for fault in _faults(run, spectrum):
         yield found("normal_stress", run.name, why=fault.why)
 
 
@@ -78,7 +73,7 @@ def sound_normal_stress(
     late: dict[str, float] = {}
     never: dict[str, str] = {}
     for run in there:
-        faults = list(_faults(run, sweep, spectrum))
+        faults = list(_faults(run, spectrum))
         lasting = [fault for fault in faults if fault.until == np.inf]
         if lasting:
             never[run.name] = f"it {lasting[0].why.rstrip('.')}"
@@ -87,9 +82,7 @@ def sound_normal_stress(
     return late, never
 
 
-def _faults(
-    run: Run, sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
-) -> Iterator[_Fault]:
+def _faults(run: Run, spectrum: RelaxationSpectrum | None) -> Iterator[_Fault]:
     normal = run.first_normal_stress_difference
     in_shear = run.protocol.control == "rate" and run.flow == "shear" and run.from_rest
     if normal is None or not (in_shear and run_checks.is_start_up(run)):
@@ -104,8 +97,6 @@ def _faults(
         )
     if spectrum is not None:
         yield from _second_order(rate, end, spectrum)
-    if sweep is not None:
-        yield from _laun(run, rate, end, sweep)
 
 
 def _averaged(values: Values, width: int) -> Float[np.ndarray, " _"]:
@@ -169,32 +160,6 @@ def _second_order(rate: float, end: float, spectrum: RelaxationSpectrum) -> Iter
             f"ends at {end:.3g} Pa; at this slow rate the linear sweep predicts a value between 0 "
             f"and {most:.3g} Pa, quadratic in the rate. The normal force is below what the "
             "transducer resolves, or has a baseline."
-        )
-
-
-def _laun(run: Run, rate: float, end: float, sweep: LinearSweep) -> Iterator[_Fault]:
-    """Hold a steady N1 against Laun's rule where Cox's and Merz's holds of the same run.
-
-    N1 = 2G′(1 + (G′/G″)²)^0.7 and σ12 = |G*| at ω = γ̇   [Laun 1986, J. Rheol. 30, 459].
-    """
-    omega, steady = sweep.angular_frequency, run_checks.steady_stress(run)
-    if steady is None or not omega[0] <= rate <= omega[-1]:
-        return
-    storage, loss = (
-        float(np.exp(np.interp(np.log(rate), np.log(omega), np.log(np.maximum(values, 1e-300)))))
-        for values in (sweep.storage_modulus, sweep.loss_modulus)
-    )
-    rule = 2.0 * storage * (1.0 + (storage / loss) ** 2) ** 0.7
-    # one mode far above its frequency has a ratio of moduli that no melt of Laun's had
-    holds = (
-        storage <= _LARGEST_RATIO * loss
-        and 1.0 / _COX_MERZ < steady / np.hypot(storage, loss) < _COX_MERZ
-    )
-    if holds and not _LAUN_LIMITS[0] <= end / rule <= _LAUN_LIMITS[1]:
-        yield _Fault(
-            f"ends at {end:.3g} Pa where Laun's rule has {rule:.3g} Pa, though the stress of the "
-            "same run follows the rule of Cox and Merz. A baseline, or a gap that gives "
-            "way, does that."
         )
 
 

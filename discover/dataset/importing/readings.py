@@ -224,10 +224,7 @@ class Readings:
         return None if rate is None else self._column(source) * rate**power
 
     def _modulus(self, part: np.ufunc) -> Values | None:
-        """Return the part of |G*| that the angle of loss or its tangent gives.
-
-        |G*| as a column, |η*| ω, or of the other modulus.
-        """
+        """Return the part of |G*|, |η*| ω or the other modulus that the angle of loss gives."""
         angle = self.alone("phase_angle")
         if angle is None and (factor := self.alone("loss_factor")) is not None:
             angle = np.arctan(factor)

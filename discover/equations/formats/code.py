@@ -1,7 +1,7 @@
 """Laws as Python text with numpy or SymPy alone.
 
-Made of tables and of numbers with twelve digits; names of files or studies occur in comments only.
-``@`` and ``trace()`` serve numpy and SymPy alike; UFL changes a few entries.
+Made of tables and of `repr` of numbers; names of files or studies occur in comments only. ``@`` and
+``trace()`` serve numpy and SymPy alike; UFL changes a few entries.
 """
 
 import re
@@ -10,7 +10,6 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
-from discover.plain_numbers import rounded
 from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
@@ -28,7 +27,7 @@ class CodeNotation(Notation):
         return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
 
     def digits_of(self, value: float) -> str:
-        return _written(float(value))
+        return repr(float(value))
 
     def letter(self, name: str) -> str:
         raise ValueError(f"Code needs a number for {name}.")
@@ -311,9 +310,9 @@ def filled(
         header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
-        modes=_written([(float(g), float(time)) for g, time in pairs]),
-        solvent=_written(float(equation.solvent_viscosity)),
-        tested=_written(equation.tested and equation.tested.boxes),
+        modes=repr([(float(g), float(time)) for g, time in pairs]),
+        solvent=repr(float(equation.solvent_viscosity)),
+        tested=repr(equation.tested and equation.tested.boxes),
         constants=constants or "",
         mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
         also=", variables" if variables else "", also_k=", variables[k]" if variables else "",
@@ -334,32 +333,27 @@ def _of_states(equation: Equation, notation: CodeNotation, by_name: bool) -> dic
         letters = {name: name for name in (*part.names, "shear_rate", "shear_stress")}
         for name, value in part.values.items():
             held = f'STRUCTURE["{part.effect}"]["{name}"]'
-            letters[name] = held if by_name else _written(float(value))
+            letters[name] = held if by_name else repr(float(value))
         own, modulus, time = part.spell(notation.scalar, letters)
         rates += own
         moduli += [f"({modulus})"] if modulus != "1" else []
         times += [f"({time})"] if time != "1" else []
     there = bool(names)
     return {
-        "state_constants": _written(constants), "state_names": ", ".join(names),
-        "at_rest": _written(rest), "state_rates": ", ".join(rates),
-        "on_modulus": " * ".join(moduli) or "1.0",
+        "state_constants": repr(constants), "state_names": ", ".join(names), "at_rest": repr(rest),
+        "state_rates": ", ".join(rates), "on_modulus": " * ".join(moduli) or "1.0",
         "on_time": " * ".join(times) or "1.0", "structured": ", structure" if there else "",
         "modulus_factor": "structure_factors(structure)[0] * " if there else "",
         "time_factor": "structure_factors(structure)[1] * " if there else "",
     }  # fmt: skip
 
 
-def _written(content: Any) -> str:
-    return repr(rounded(content))
-
-
 def _constants(equation: Equation) -> str:
     """Return the constants of the named law, one table for each mode."""
     assert equation.named is not None
     each = (equation.named.of_mode(k) for k in range(len(equation.modulus)))
-    return _written([{name: float(value) for name, value in one.items()} for one in each])
+    return repr([{name: float(value) for name, value in one.items()} for one in each])
 
 
 def _numbers(values: Sequence[float]) -> str:
-    return _written([float(value) for value in values])
+    return repr([float(value) for value in values])

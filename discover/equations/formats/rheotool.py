@@ -16,7 +16,6 @@ from discover.equations.formats.latex_file import header_lines
 from discover.equations.parts import EXPONENTIAL, combined
 from discover.errors import InputError
 from discover.laws.textbook.classical import fene_p_terms
-from discover.plain_numbers import rounded
 from tensor_library.terms import parse_term
 
 DENSITY = 1000.0
@@ -219,7 +218,7 @@ def _entries(model: RheoToolModel, g: float, time: float, solvent: float, densit
 
 
 def _entry(name: str, dimensions: str, value: float) -> str:
-    return f"{name:<17}{name} {dimensions} {rounded(value)};"
+    return f"{name:<17}{name} {dimensions} {value!r};"
 
 
 def _of_name(equation: Equation) -> RheoToolModel:

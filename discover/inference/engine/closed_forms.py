@@ -10,8 +10,8 @@ that of Herschel & Bulkley 1926, Kolloid-Z. 39, 291, whose yield stress sets in 
     σ12 = sign(γ̇) (τ_y (1 − exp(−m |γ̇|)) + K |γ̇|^n),
 
 the same without a yield stress [Ostwald 1925, Kolloid-Z. 36, 99], the solid of Kelvin & Voigt,
-σ12 = G γ + η γ̇, and one Maxwell mode with a Newtonian solvent, or two without, in creep too
-[Tschoegl 1989, The Phenomenological Theory of Linear Viscoelastic Behavior, ch. 3].
+σ12 = G γ + η γ̇, and one Maxwell mode with a Newtonian solvent, or two without   [Tschoegl 1989,
+The Phenomenological Theory of Linear Viscoelastic Behavior, ch. 3].
 """
 
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def viscosity(
 
 
 def recorded(law: str, constants: Constants, run: Run) -> Float[np.ndarray, " n"]:
-    """Return what a law records: moduli or σ12 in shear at a given rate, in Pa, or strain in creep.
+    """Return what a law records: moduli or σ12 in shear at a given rate, in Pa; strain in creep.
 
     `constants`: as of `viscosity`; G and η of a solid; G, λ and η_s of one mode; or G and λ of each
     of two. What remembers takes runs from rest.
@@ -86,32 +86,15 @@ def recorded(law: str, constants: Constants, run: Run) -> Float[np.ndarray, " n"
 
 
 def _crept(law: str, constants: Constants, run: Run) -> Float[np.ndarray, " n"]:
-    """Return the strain at a given stress, from rest: J0 at once, flow, one retarded compliance."""
+    """Return the strain of a viscous fluid or a solid at a given stress, from rest."""
     knots = np.asarray(run.protocol.table_times)
     time = np.union1d(knots, run.time)
     stress = np.interp(time, knots, np.asarray(run.protocol.table_rates))
-    at_once, fluidity, retarded, retardation = _compliances(law, constants)
-    flowed = cumulative_trapezoid(stress, time, initial=0.0)
-    delayed = _relaxing(time - time[0], stress, retardation) / retardation
-    whole = at_once * stress + fluidity * flowed + retarded * delayed
-    return whole[np.searchsorted(time, run.time)]
-
-
-def _compliances(law: str, constants: Constants) -> tuple[float, float, float, float]:
-    """Return J0 in 1/Pa, 1/η0 in 1/(Pa s), the retarded compliance in 1/Pa and its time in s."""
     if law == NEWTONIAN:
-        return 0.0, 1.0 / constants[0], 0.0, 1.0
-    if law == KELVIN_VOIGT:
-        return 0.0, 0.0, 1.0 / constants[0], constants[1] / constants[0]
-    modes, solvent = _modes(law, constants)
-    moduli, times = np.array(modes).T
-    eta = float(moduli @ times) + solvent
-    if law == MAXWELL:
-        retardation = times[0] * solvent / eta
-        return 0.0, 1.0 / eta, float(times[0] - retardation) / eta, float(retardation)
-    at_once = 1.0 / float(np.sum(moduli))
-    retarded = float(moduli @ times**2) / eta**2 - at_once
-    return at_once, 1.0 / eta, retarded, float(np.prod(times)) / (at_once * eta)
+        whole = cumulative_trapezoid(stress, time, initial=0.0)
+    else:  # G γ + η γ̇ = σ relaxes as a Maxwell mode does, within η/G
+        whole = _relaxing(time - time[0], stress, constants[1] / constants[0])
+    return whole[np.searchsorted(time, run.time)] / constants[-1]
 
 
 def _modes(law: str, constants: Constants) -> tuple[list[tuple[float, float]], float]:

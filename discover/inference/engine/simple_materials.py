@@ -48,9 +48,9 @@ _WEIGHED = {"rate": _VISCOUS, "steady": _VISCOUS, "oscillation": _LINEAR, "stres
 _BESIDE_A_TIME = NEWTONIAN, HERSCHEL_BULKLEY
 """What a flow curve shows of a fluid whose relaxation time is known: such a fluid thins too."""
 
-_RELAXING = MAXWELL, TWO_MODES
+_RELAXING = {"rate": (MAXWELL, _GOING_ON, TWO_MODES), "oscillation": (MAXWELL, TWO_MODES)}
 """Fluids that a solid must differ from: of times within the record, for one that relaxes later is
-that solid."""
+that solid. In creep those of the search."""
 
 _AHEAD = 3.0
 """Log evidence by which a yield stress or a modulus must lead what has none: that is strong
@@ -263,8 +263,7 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         return bool(np.sqrt(np.mean(((record - fitted.record(fit)) / noise) ** 2)) < SAME)
 
     if law == KELVIN_VOIGT:
-        going_on = (_GOING_ON,) * (control == "rate")
-        for own, one in (_fitted(fitter, name) for name in (*_RELAXING, *going_on)):
+        for own, one in (_fitted(fitter, name) for name in _RELAXING.get(control, ())):
             if one.log_evidence > fit.log_evidence or is_same(own.record(one)):
                 return None
     seen = _SEEN * np.min(np.abs(fitter.rows.recorded)) if fitted.is_curve else 0.0
@@ -278,9 +277,9 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
         others = float(np.logaddexp.reduce(ranks))
         if is_same(fitter.record(alive[0])):
             times = problem.declared.relaxation_time * np.exp(alive[0].theta[1])
-            fits_time = 1 in problem.declared.free_positions
-            later = law == KELVIN_VOIGT and fits_time and np.min(times) > fitted.longest
-            others -= np.inf if later else _NEAR  # one that relaxes later is that solid
+            later = law == KELVIN_VOIGT and 1 in problem.declared.free_positions
+            later &= np.min(times) > fitted.longest
+            others -= np.inf if later else _NEAR
     unknown = rank + Discrepancy(fitted, fit).log_factor + LOG_ODDS_OF_NONE
     # one that leaves something is told where all that relaxes leaves something too
     whole = np.logaddexp(rank, unknown) if posterior.verdict == "unexplained" else rank
