@@ -24,7 +24,7 @@ def without_pages() -> Iterator[None]:
     from discover.report.comparison import report as comparison_report
 
     def loop(result, folder, *_, **__):
-        result.write_json(folder.path / "loop.json")
+        folder.write("loop.json", json.dumps(result.to_json()) + "\n")
         lines.write_predictions(lines.loop_predictions(result), folder)
 
     def comparison(result, folder, *_, **__):
