@@ -63,7 +63,7 @@ class Kernel(Code):
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._weights = (self._kinds, WEIGHTS) if self._kinds > 1 else (WEIGHTS,)
+        self._weights = self._kinds * WEIGHTS  # of a mode
         self._make(fluid, found, flow, cycles)
 
     def __call__(
@@ -89,7 +89,7 @@ class Kernel(Code):
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * self.size
         # the state stands there twice: as it was before a piece, too
-        room = _STATE + 2 * (size - _STATE) + modes * self._kinds * WEIGHTS
+        room = _STATE + 2 * (size - _STATE) + modes * self._weights
         room += Cycles.room(self._state_at - _LEVELS, modes, self.size) * self._begins
         scratch = np.empty((room, LANES))
         arrays = given | {
@@ -110,9 +110,9 @@ class Kernel(Code):
         self._numbers = w.at((modes, self.size), (self._state_at - _STATE, 1))
         self._weights_at = w.at((self._numbers, 2), (_STATE, 1))
         if self._begins:
-            room = w.at((self._weights_at, 1), (modes, self._kinds * WEIGHTS))
-            has_states = self._on["states"]
-            self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
+            room = w.at((self._weights_at, 1), (modes, self._weights))
+            own = self._levels, _LEVELS, self._state_at, room, self._on["states"]
+            self._cycles = Cycles(self, *own)
         with w.loop(w.counts["runs"]) as run, self._arithmetic.apart():
             self._of_run(run)
 
@@ -320,7 +320,7 @@ class Kernel(Code):
         ):  # fmt: skip
             mode, on = self._tree("mode", self._of_mode, number), {"own weights": True}
             weights = self._write(self._step.weights, mode, on, width, np.zeros(WEIGHTS))
-            self._keep(weights, self._place_of_weights(number))
+            self._keep(weights, w.at((number, self._weights), (self._weights_at, 1)))
 
     def _is_own(self, number) -> Any:
         """Return whether the weights of a mode are its own, and not those of the table."""
@@ -328,14 +328,12 @@ class Kernel(Code):
         untabled = b.icmp_signed(">=", number, self._w.counts["tabled"])
         return b.or_(self._on["own weights"], untabled)
 
-    def _place_of_weights(self, number) -> Any:
-        return self._w.at((number, self._kinds * WEIGHTS), (self._weights_at, 1))
-
     def _mode(self, run, number, mode_number):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, a, counts = self._w, self._arithmetic, self._w.counts
         mode, at = self._tree("mode", self._of_mode, mode_number), self._place_of_mode(mode_number)
-        weights = self._kept(self._place_of_weights(mode_number), *self._weights)
+        place = w.at((mode_number, self._weights), (self._weights_at, 1))
+        weights = self._kept(place, self._weights)
         if self._kinds == 1:
             own = self._is_own(mode_number)
             # past the table's end its first row is read, and not used
