@@ -93,7 +93,7 @@ def periodic_modes(
     if mirrored:
         signs[3 : 4 * (1 + dynamics.tensors) : 4] = -1.0
 
-    def after_cycle(fluid: Dynamics, stress):
+    def after_cycle(fluid: Dynamics, stress) -> Any:
         def step(stress, inputs):
             number, rates, weights = inputs
             after = fluid.stepped(weights, stress, rates, flow)

@@ -27,7 +27,7 @@ class ExactNotation(Notation):
     any number will do.
     """
 
-    def __init__(self, stress, rate, one=1, zero=0, forms=None):
+    def __init__(self, stress, rate, one: Any = 1, zero: Any = 0, forms=None):
         s11, s22, s33, s12 = stress
         self.tensors = {
             "I": (one, one, one, zero, zero),

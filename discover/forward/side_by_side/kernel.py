@@ -57,7 +57,7 @@ class Kernel(Code):
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._weights = (self._kinds, WEIGHTS) if self._kinds > 1 else (WEIGHTS,)
+        self._weights = self._kinds * WEIGHTS  # of a mode
         self._make(fluid, found, flow)
 
     def __call__(
@@ -92,7 +92,7 @@ class Kernel(Code):
         def follow(state, first, behind, records, ends=False) -> None:
             """Follow runs from one step to another, and let `state` hold where that ends."""
             # the state stands there twice: as it was before a piece, too
-            room = 2 * size - _STATE + modes * self._kinds * WEIGHTS
+            room = 2 * size - _STATE + modes * self._weights
             scratch, taken = np.empty((room, LANES)), np.zeros(1, np.int64)
             arrays = given | {
                 "flags": flags, "scratch": scratch, "taken": taken, "state": state,
@@ -341,7 +341,7 @@ class Kernel(Code):
         ):  # fmt: skip
             mode, on = self._tree("mode", self._of_mode, number), {"own weights": True}
             weights = self._write(self._step.weights, mode, on, width, np.zeros(WEIGHTS))
-            self._keep(weights, self._place_of_weights(number))
+            self._keep(weights, w.at((number, self._weights), (self._weights_at, 1)))
 
     def _is_own(self, number) -> Any:
         """Return whether the weights of a mode are its own, and not those of the table."""
@@ -349,14 +349,12 @@ class Kernel(Code):
         untabled = b.icmp_signed(">=", number, self._w.counts["tabled"])
         return b.or_(self._on["own weights"], untabled)
 
-    def _place_of_weights(self, number) -> Any:
-        return self._w.at((number, self._kinds * WEIGHTS), (self._weights_at, 1))
-
     def _mode(self, run, number, mode_number):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, a, counts = self._w, self._arithmetic, self._w.counts
         mode, at = self._tree("mode", self._of_mode, mode_number), self._place_of_mode(mode_number)
-        weights = self._kept(self._place_of_weights(mode_number), *self._weights)
+        place = w.at((mode_number, self._weights), (self._weights_at, 1))
+        weights = self._kept(place, self._weights)
         if self._kinds == 1:
             own = self._is_own(mode_number)
             # past the table's end its first row is read, and not used
