@@ -38,15 +38,15 @@ class Approximation(NamedTuple):
     """An approximation to the modes, and the best one of each that was tried.
 
     `stress`, `best`: dimensionless, σ and structure variables. `best_misfit`, `best_step`: what a
-    cycle changes in the best one, relative, and Newton's step from it.
+    cycle changes in the best one, relative, and Newton's step from it. Arrays are JAX's or NumPy's.
     """
 
-    stress: Float[Array, "s k"]
-    best: Float[Array, "s k"]
-    best_misfit: Float[Array, " k"]
-    best_step: Float[Array, "s k"]
-    share: Float[Array, " k"]  # of that step that is taken
-    number: Float[Array, ""]  # of cycles gone through
+    stress: Float[Any, "s k"]
+    best: Float[Any, "s k"]
+    best_misfit: Float[Any, " k"]
+    best_step: Float[Any, "s k"]
+    share: Float[Any, " k"]  # of that step that is taken
+    number: Float[Any, ""]  # of cycles gone through
 
 
 def first_approximation(stress: Float[Array, "s k"], number: int = 0) -> Approximation:

@@ -5,7 +5,6 @@ approximation, and from each component of all modes and each state moved a littl
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -85,8 +84,8 @@ def periodic_starts(
         hopeful = np.min(following.share.reshape(runs, k, lanes), axis=1) > HOPELESS
         hopeful &= following.number < MOST
         going = np.broadcast_to(alive[:, None], (runs, k, lanes)).ravel()
-        kept: Any = (np.where(going, b, a) for a, b in zip(now[:5], following[:5], strict=True))
-        now = Approximation(*kept, following.number)
+        kept = [np.where(going, b, a) for a, b in zip(now[:5], following[:5], strict=True)]
+        now = Approximation._make([*kept, following.number])
         # one that stays where it is, as of an effect that is absent, may be anywhere
         stays = end_levels == levels
         step = (end_levels - levels) / np.where(stays, 1.0, 1.0 - slopes)
