@@ -2,7 +2,8 @@
 
 from discover.answer.answer import QUANTITIES, TOLERANCE, Answer, HasAnswer
 from discover.answer.constant import Constant
-from discover.answer.parts import Discrepancy, ExpectedError, Mode, Range, Suspect
+from discover.answer.parts import ExpectedError, Mode, Range, Suspect
+from discover.inference.engine.posterior import Discrepancy
 
 __all__ = [
     "QUANTITIES",

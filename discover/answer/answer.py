@@ -7,8 +7,9 @@ from typing import Any
 from discover.answer import modes_in_words, sentences
 from discover.answer.constant import Constant
 from discover.answer.error_table import errors
-from discover.answer.parts import Discrepancy, ExpectedError, Mode, Range, Suspect
+from discover.answer.parts import ExpectedError, Mode, Range, Suspect
 from discover.equations.equation import Equation
+from discover.inference.engine.posterior import Discrepancy
 from discover.plain_numbers import plain
 from discover.summary_view import Estimate
 

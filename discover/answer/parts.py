@@ -135,19 +135,3 @@ class ExpectedError:
         if (apart := self.spread[0]) is None:
             return f"{self.missing}: {self.note}".removesuffix(": ")
         return f"{self.note or self.missing}: laws that fit as well differ by {percent_of(apart)}"
-
-
-@dataclass(frozen=True)
-class Discrepancy:
-    """Size of what no law describes, over the root mean square of the records, without noise.
-
-    `size`, `ci95`: of all runs in the range.
-    `grows_with_rate`: power of the shear rate with which it grows; None where the data do not tell.
-    """
-
-    size: float
-    ci95: Span
-    by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
-    grows_with_rate: float | None = None
-    unseen: str = ""  # ``unseen runs`` where it is the error of such; empty: of fitted ones
-    met_up_to: str = ""  # rate up to which each run meets the tolerance; empty where all or none do

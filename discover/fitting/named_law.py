@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.answer import TOLERANCE, Discrepancy
+from discover.answer import TOLERANCE
 from discover.dataset import Dataset, Run
 from discover.dataset.run_table import temperature_of
 from discover.errors import InputError
@@ -154,7 +154,7 @@ def fit(
         augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
         ended.verdict == "no_effect_needed", ended.noise,
-        None if left is None else Discrepancy(**left), tuple(ended.records),
+        left, tuple(ended.records),
         model, best.theta, declared_law(forward, best.theta, {}),
         {name: value for name, value in fixed.items() if name in LAWS[law].parameters},
         data.name, tolerance,

@@ -45,8 +45,7 @@ def with_unseen(result: Any) -> Discrepancy | None:
     """Return the discrepancy of a closed loop, of all unseen runs in the range if there are any."""
     if result.discrepancy is None:
         return None
-    found = Discrepancy(**result.discrepancy)
-    errors = unseen_errors(result)
+    found, errors = result.discrepancy, unseen_errors(result)
     size, count = _mean([*errors.values()]), len(errors)
     if not found.size or size is None:
         return found

@@ -1,7 +1,7 @@
 """A posterior as the result of a closed loop: everything that is reported, in one object."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri
 
+from discover.answer import Discrepancy
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.effects.letters import spelled_apart
@@ -126,7 +127,7 @@ class Ended(Path):
         return ConstantByMode(float(fit.theta[at]), ends, "", mean_time, _FREE, evidence, modes)
 
     @cached_property
-    def discrepancy(self) -> dict[str, Any] | None:
+    def discrepancy(self) -> Discrepancy | None:
         """Size of what the law leaves; None where no hypothesis can be followed.
 
         Where runs left out in turn tell it, by how much the law misses these: then their mean, and
@@ -134,13 +135,13 @@ class Ended(Path):
         """
         size, missed = None if self.without_fluid else self.posterior.discrepancy(), self._left_out
         if size is None or self.verdict != "unexplained" or missed is None:
-            return None if size is None else asdict(size)
+            return size
         if len(missed) < FEWEST_RUNS:
-            return asdict(size)
+            return size
         mean = float(np.mean(missed))
         ends = np.sqrt(len(missed) / chdtri(len(missed), (0.025, 0.975)))
         low, high = (float(end) * mean for end in ends)
-        return asdict(replace(size, size=mean, ci95=(low, high), by_run=self.left_out))
+        return replace(size, size=mean, ci95=(low, high), by_run=self.left_out)
 
     @property
     def left_out(self) -> dict[str, float]:

@@ -14,7 +14,7 @@ from discover.effects import AbstractEffect, ConstitutiveEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.inference.engine import Posterior
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.free_form import FreeForm
 from discover.inference.engine.free_functions import free_functions
@@ -262,4 +262,4 @@ def without_fluid(posterior: Posterior) -> bool:
     if not np.isfinite(best.log_evidence):
         return False
     lost = search.rank(alive[0]) - best.log_evidence - problem.log_prior(best.names)
-    return bool(lost < 0.0 and Discrepancy(fitter, best).log_factor < 0.0)
+    return bool(lost < 0.0 and DiscrepancyModel(fitter, best).log_factor < 0.0)

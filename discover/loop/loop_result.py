@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from discover.answer import TOLERANCE, Answer, HasAnswer
+from discover.answer import TOLERANCE, Answer, Discrepancy, HasAnswer
 from discover.answer.simple_material import SimpleMaterial
 from discover.effects.registry import spelled_on_a_page
 from discover.equations import (
@@ -88,7 +88,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     next_tests: NextTests = field(repr=False, default_factory=NextTests)
     laws: tuple[parts.LawFit, ...] = ()
     free_form: tuple[FreeForm, ...] = ()
-    discrepancy: Mapping[str, Any] | None = None
+    discrepancy: Discrepancy | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out: Mapping[str, float] = field(default_factory=dict)
     corrections: Mapping[str, float] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from discover.answer.naming import ByMode, named_law
 from discover.equations import Equation, StatePart
 from discover.errors import InputError
 from discover.inference.engine import Posterior
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
@@ -79,7 +79,7 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     order = [at, *(i for i in np.argsort(-weights, kind="stable") if i != at)]
     return replace(
         posterior,
-        left=Discrepancy(fitter, chosen, smallest(posterior.search, chosen)),
+        left=DiscrepancyModel(fitter, chosen, smallest(posterior.search, chosen)),
         by_left_out=tuple((some[i], float(weights[i])) for i in order),
     )
 

@@ -216,7 +216,7 @@ def _by_geometry(result: Any) -> str:
 
     The fitted one that is missed most, by its own size.
     """
-    by_run = (result.discrepancy or {}).get("by_run", {})
+    by_run = {} if result.discrepancy is None else result.discrepancy.by_run
     own = _sheared(result) or [record for record in result.records if not record.held_out]
     sizes = {record.name: by_run.get(record.name, float(record.errors[-1])) for record in own}
     worst = max(own, key=lambda record: sizes[record.name], default=None)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from discover.answer import Discrepancy
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.loop.answering import _constants, shows_a_derivative
@@ -39,8 +40,7 @@ def result(records, left=0.06, **more):
     found = {
         "records": records, "left_out": {} if left is None else by_run, "noise_floor": NOISE,
         "folds": (),
-        "discrepancy": {"size": left, "ci95": (0.04, 0.1), "by_run": by_run,
-                        "grows_with_rate": None},
+        "discrepancy": Discrepancy(left, (0.04, 0.1), by_run),
         "spread_of_laws": {"N1": Spread(0.6, 0.8), "uniaxial": Spread(1.2, 1.3)},
         "verdict": "unexplained", "material": None, "stages": (), "tolerance": 0.05,
         "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
@@ -111,7 +111,7 @@ def test_a_run_beyond_the_rates_does_not_count_inside():
 
 def test_each_quantity_has_the_error_of_its_own_unseen_runs_and_fitted_ones_a_residual():
     found = result([FITTED[0]], left=None)
-    found.discrepancy = {"size": 0.02, "ci95": (0.01, 0.03), "by_run": {}, "grows_with_rate": None}
+    found.discrepancy = Discrepancy(0.02, (0.01, 0.03))
     assert not with_unseen(found).unseen
     assert errors_by_quantity(found)["sigma12"].inside is None
     normal = record("slow (N1)", 0.1, 0.05, quantity="N1")
@@ -228,7 +228,7 @@ def close(records=FITTED, **more):
 def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_first():
     pulled = replace(record("pulled", 0.3, 0.4, quantity="tensile_stress"), flow="uniaxial")
     found = result([*FITTED, pulled])  # misses of 6 %, tolerance 5 %
-    found.discrepancy["by_run"] = {"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4}
+    found.discrepancy.by_run.update({"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4})
     told = what_to_measure_next(found)
     assert told == (
         "Repeat the start-up at 1 1/s (fast) with another gap; if its misfit changes, suspect the "

@@ -1,4 +1,4 @@
-"""Discrepancy: what no hypothesis holds, in the law and in the records, with a size.
+"""DiscrepancyModel: what no hypothesis holds, in the law and in the records, with a size.
 
 To first order about a fit the records are
 
@@ -119,7 +119,7 @@ class _Products(NamedTuple):
     inner: Float[np.ndarray, "runs k k"]
 
 
-class Discrepancy:
+class DiscrepancyModel:
     """What the records say beside a hypothesis that none of its constants does.
 
     `fitter`, `fit`: a hypothesis with derivatives, and what fitted it. `smallest`: what the least

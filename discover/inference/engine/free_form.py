@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import LOG_ODDS_OF_NONE
 from discover.inference.engine.with_function import WithFunction, WithSlip
@@ -70,7 +70,7 @@ class FreeFunction:
     fitter: "WithFunction | WithSlip"
     log_odds: float
     log_odds_in_all: float
-    left: Discrepancy | None
+    left: DiscrepancyModel | None
 
     @property
     def is_shown(self) -> bool:

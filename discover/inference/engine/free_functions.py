@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects.library_term import LibraryTerm
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeForm, FreeFunction
 from discover.inference.engine.posterior import NEAR, WINDOW, Posterior
@@ -73,7 +73,7 @@ class _Laws:
     may be likely beside a function.
     """
 
-    def __init__(self, posterior: Posterior, left: Discrepancy):
+    def __init__(self, posterior: Posterior, left: DiscrepancyModel):
         self.search, self.problem = posterior.search, posterior.problem
         fits = [
             fit
@@ -128,7 +128,7 @@ class _Laws:
         if max(odds, in_all) < _POSSIBLE:
             return None
         form = self._form(curve, fit, weighed)
-        left = Discrepancy(fitter, weighed[0][0]) if odds > 0.0 else None
+        left = DiscrepancyModel(fitter, weighed[0][0]) if odds > 0.0 else None
         return FreeFunction(form, weighed, fitter, float(odds), float(in_all), left)
 
     def _gained_in_all(self, fitter: WithFunction | WithSlip, fit: Fit) -> float:
@@ -181,7 +181,7 @@ def _weighed(fits: Sequence[Fit], rank_of: Callable[[Fit], float]) -> tuple[tupl
     return tuple(sorted(shares, key=lambda pair: -pair[1]))
 
 
-def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
+def _likeliest(search: Search, discrepancies: Sequence[DiscrepancyModel]) -> float:
     """Return the largest log of evidence times prior, with a discrepancy or without."""
     beside = [search.rank(one.fit) + one.log_factor for one in discrepancies]
     return max(*beside, *(search.rank(fit) for fit in search.alive()[:1]))

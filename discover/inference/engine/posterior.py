@@ -1,6 +1,6 @@
 """Posterior over hypotheses: probabilities, constants, and bands of what was not fitted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import Band, Predictions, quantiles
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeFunction
 from discover.inference.engine.left_out import FEWEST_RUNS, by_first_order, by_left_out, left_out
@@ -65,17 +65,21 @@ class Indistinguishable:
 
 
 @dataclass(frozen=True)
-class Size:
-    """How large a discrepancy is, over the root mean square of the records.
+class Discrepancy:
+    """Size of what no law describes, over the root mean square of the records, without noise.
 
-    `size`, `ci95`: of all fitted runs. `by_run`: by name of the run. `grows_with_rate`: power of
-    the shear rate with which it grows, if the records tell.
+    `size`, `ci95`: of all runs in the range. `by_run`: by name of the run. `grows_with_rate`: power
+    of the shear rate with which it grows; None where the data do not tell. `unseen`: ``unseen
+    runs`` where it is the error of such; empty: of fitted ones. `met_up_to`: rate up to which each
+    run meets the tolerance; empty where all or none do.
     """
 
     size: float
     ci95: tuple[float, float]
-    by_run: dict[str, float]
-    grows_with_rate: float | None
+    by_run: Mapping[str, float] = field(default_factory=dict)
+    grows_with_rate: float | None = None
+    unseen: str = ""
+    met_up_to: str = ""
 
 
 @dataclass
@@ -96,7 +100,7 @@ class Posterior:
     explanations: tuple[Indistinguishable, ...]
     unexplained: float
     fits: tuple[tuple[Fit, float], ...]
-    left: Discrepancy | None
+    left: DiscrepancyModel | None
     by_left_out: tuple[tuple[Fit, float], ...] = ()
     curves: tuple[FreeFunction, ...] = ()
     memory: dict = field(default_factory=dict)
@@ -177,7 +181,7 @@ class Posterior:
         return low, high
 
     @in_one_thread
-    def discrepancy(self) -> "Size | None":
+    def discrepancy(self) -> Discrepancy | None:
         """Return how large what no hypothesis holds is; None where none can be followed.
 
         It is no smaller than what fitted runs are missed by that are left out in turn, and it is
@@ -196,7 +200,7 @@ class Posterior:
         weight = sum(w for _, w in growth)
         by_run = np.maximum(np.median(drawn, axis=0), missed) if self.unexplained > 0.5 else 0.0
         names = [run.name for run in self.problem.fitted.runs]
-        return Size(
+        return Discrepancy(
             float(size),
             (float(low), float(high)),
             dict(zip(names, np.broadcast_to(by_run, runs).tolist(), strict=True)),
@@ -303,11 +307,11 @@ def by_all_runs(search: Search, done: Search | None = None) -> Search:
     return done
 
 
-def _left_by(search: Search, fit: Fit) -> Discrepancy:
+def _left_by(search: Search, fit: Fit) -> DiscrepancyModel:
     """Return what a hypothesis leaves; one that is known if nothing has changed."""
     least, known = smallest(search, fit), fit.memory.get("left")
     if known is None or known.fit is not fit or known.smallest != least:
-        known = fit.memory["left"] = Discrepancy(search.fitter, fit, least)
+        known = fit.memory["left"] = DiscrepancyModel(search.fitter, fit, least)
     return known
 
 

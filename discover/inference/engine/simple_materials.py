@@ -25,7 +25,7 @@ from discover.inference.engine.closed_forms import (
     recorded,
     strain_of,
 )
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import SAME, Posterior
 from discover.inference.engine.priors import Prior
@@ -280,7 +280,7 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
             later = law == KELVIN_VOIGT and 1 in problem.declared.free_positions
             later &= np.min(times) > fitted.longest
             others -= np.inf if later else _NEAR
-    unknown = rank + Discrepancy(fitted, fit).log_factor + LOG_ODDS_OF_NONE
+    unknown = rank + DiscrepancyModel(fitted, fit).log_factor + LOG_ODDS_OF_NONE
     # one that leaves something is told where all that relaxes leaves something too
     whole = np.logaddexp(rank, unknown) if posterior.verdict == "unexplained" else rank
     if whole < np.logaddexp(others, nothing):
