@@ -4,8 +4,12 @@ Importing this module does it; whatever needs JAX imports it before JAX, so that
 process, also a worker that unpickles an estimator. ``import discover`` alone does not.
 """
 
+import inspect
 import os
 import sys
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
 
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError
@@ -74,6 +78,22 @@ def _has_started() -> bool:
     bridge = sys.modules.get("jax._src.xla_bridge")  # JAX has no public name for it
     started = getattr(bridge, "backends_are_initialized", None)
     return True if started is None else bool(started())
+
+
+def answer_calls(package: str, answer: Callable[..., Any]) -> None:
+    """Let a package be called: ``discover.laws()`` and ``discover.laws.Giesekus`` share a name.
+
+    `package`: its full name. `answer`: what a call calls.
+    """
+
+    class CallablePackage(ModuleType):
+        def __call__(self, *args: Any, **options: Any) -> Any:
+            return answer(*args, **options)
+
+    module = sys.modules[package]
+    module.__class__ = CallablePackage
+    module.__doc__ = f"{inspect.getdoc(answer)}\n\n{inspect.getdoc(module)}"
+    module.__signature__ = inspect.signature(answer)  # type: ignore[attr-defined]
 
 
 set_up()

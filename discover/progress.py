@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from functools import cache
 from threading import Event
 
 from discover.errors import InputError
@@ -73,48 +72,27 @@ def by_time(
 
 
 class Crowding:
-    """How much longer this process takes than alone on the machine of which seconds are told.
+    """How much longer this process takes than alone: its time on the clock over its processors'.
 
-    The time that this machine takes for a piece of work over the time there (`slow`), times that on
-    the clock over that of its processors: one at least, which other processes raise that want the
-    same cores. Counted from the beginning.
+    One at least, which other processes raise that want the same cores. Counted from the beginning.
     """
 
     def __init__(
         self,
         clock: Callable[[], float] = time.perf_counter,
         processor: Callable[[], float] = time.process_time,
-        slow: Callable[[], float] | None = None,
     ):
-        self._clock, self._processor, self._slow = clock, processor, slow or slowness
+        self._clock, self._processor = clock, processor
         self._begun = clock(), processor()
 
     def __call__(self) -> float:
         """Return the factor so far."""
         passed, worked = self._clock() - self._begun[0], self._processor() - self._begun[1]
-        crowded = max(1.0, passed / worked) if worked > _TELLING else 1.0
-        return self._slow() * crowded
+        return max(1.0, passed / worked) if worked > _TELLING else 1.0
 
 
 _TELLING = 0.2
 """Seconds of the processor that tell how crowded a machine is."""
-
-_STEPS, _TIMES = 50_000, 5
-_REFERENCE = 0.0010
-"""Steps of a piece of work, how often it is done, and its seconds where those of this software were
-measured."""
-
-
-@cache
-def slowness() -> float:
-    """Return the time that this machine takes for a piece of work over that of the reference."""
-    times = []
-    for _ in range(_TIMES):
-        begun, total = time.perf_counter(), 0  # a processor's time may tick in hundredths
-        for step in range(_STEPS):
-            total += step & 7
-        times.append(time.perf_counter() - begun)
-    return min(times) / _REFERENCE
 
 
 class FollowedBy:

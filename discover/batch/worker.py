@@ -13,7 +13,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from discover.inputs_kept import inputs_kept
-from discover.linear_algebra_threads import use_one_thread_from_the_start
+from discover.processor import use_one_thread_from_the_start
 from discover.report.plots import keep_out_of_the_working_directory
 
 

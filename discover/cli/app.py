@@ -12,12 +12,11 @@ import typer
 from typer import Argument, Option
 
 from discover._version import __version__
-from discover.accelerators import use_the_processor_from_the_start
 from discover.cli import console
 from discover.cli.console import heard_or_not, obeying_interrupts, progress_bar
 from discover.cli.data_commands import data_app
 from discover.cli.law_commands import effects, export, fit, laws
-from discover.linear_algebra_threads import use_one_thread_from_the_start
+from discover.processor import use_one_thread_from_the_start, use_the_processor_from_the_start
 from discover.report.plots import keep_out_of_the_working_directory
 
 app = typer.Typer(

@@ -17,10 +17,10 @@ from discover.inference.engine.fit import Fit
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.rows import Rows
 from discover.learners.results import RecoveredTerm
-from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import weighed_laws
 from discover.loop.loop import Found, search
 from discover.loop.task import Say, Task
+from discover.processor import in_one_thread
 from discover.study.data import StudyData
 from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study

@@ -37,10 +37,10 @@ from discover.identify import Structure, analyse_structure
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
 from discover.learners.settings import waiting
-from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
 from discover.loop.search_time import ComparisonTime, SearchTime
+from discover.processor import in_one_thread
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data

@@ -1,7 +1,5 @@
 """The dictionary of effects that a model may lack."""
 
-from discover import first_use as first_use  # double precision, before any array is made
-from discover.callable_package import answer_calls
 from discover.effects.base import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -24,6 +22,7 @@ from discover.effects.registry import (
     make_effect,
     named_effects,
 )
+from discover.first_use import answer_calls  # first: it sets double precision
 
 __all__ = [
     "AbstractEffect", "ConstitutiveEffect", "EffectParameter", "KinematicEffect", "KnownEffect",

@@ -9,7 +9,7 @@ import pandas as pd
 from jaxtyping import Real
 from numpy.typing import ArrayLike
 
-from discover.effects.letters import Spelled, spelled_apart
+from discover.effects.registry import Spelled, spelled_apart
 from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
 from discover.equations.spelling.markup import (
     SEPARATOR,

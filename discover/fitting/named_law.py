@@ -20,12 +20,12 @@ from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Search
 from discover.laws import LAWS, Fluid, make_law
 from discover.laws.registry import starting_values
-from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
 from discover.loop.from_posterior import Ended
 from discover.loop.loop import without_fluid
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs, unfitted_runs
 from discover.plain_numbers import as_number, as_whole_number
+from discover.processor import in_one_thread
 from discover.study.declared_model import MODE_CONSTANTS, StudyModel, forward_model, linear_start
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Verdict

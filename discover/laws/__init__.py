@@ -1,7 +1,6 @@
 """Constitutive laws behind one interface."""
 
-from discover import first_use as first_use  # double precision, before any array is made
-from discover.callable_package import answer_calls
+from discover.first_use import answer_calls  # first: it sets double precision
 from discover.laws.base import AbstractConstitutiveLaw, NamedLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid

@@ -18,7 +18,7 @@ from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.laws.expansion import LibraryExpansion, in_shared_form
 from discover.learners.files import kept_in_files
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.residual import noise_beside
+from discover.statistics.noise.whiteness import noise_beside
 from discover.words import percent_of
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]

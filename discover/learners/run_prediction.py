@@ -26,7 +26,7 @@ from discover.learners.settings import (
     require_known_rate,
     require_signal,
 )
-from discover.linear_algebra_threads import in_one_thread
+from discover.processor import in_one_thread
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell
 

@@ -229,7 +229,7 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
-    # as their equations stand (`discover.effects.letters`)
+    # as their equations stand (`discover.effects.registry`)
     in_fluid.sort(key=lambda one: (0, one.effect) if one.effect in STRUCTURES else (1, ""))
     found = list(_constants(result.declared_parameters))
     for stage in in_fluid:

@@ -15,8 +15,8 @@ from discover.inference.engine.bands import Predictions
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.rows import Rows
-from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
+from discover.processor import in_one_thread
 from discover.protocols import in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
 

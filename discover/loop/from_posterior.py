@@ -14,7 +14,7 @@ from scipy.special import chdtri
 from discover.answer import Discrepancy
 from discover.dataset import Run
 from discover.effects import AbstractEffect
-from discover.effects.letters import spelled_apart
+from discover.effects.registry import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.identify.twins import oil_twin
 from discover.inference.engine.design import NextTests, design
@@ -39,7 +39,7 @@ from discover.loop.parts import (
 from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
 from discover.loop.sentences import EXPLAINED
-from discover.statistics.residual import noise_beside
+from discover.statistics.noise.whiteness import noise_beside
 from discover.words import percent_of
 
 _DRAWS = 2000

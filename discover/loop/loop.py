@@ -20,7 +20,6 @@ from discover.inference.engine.free_form import FreeForm
 from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.search import Search
-from discover.linear_algebra_threads import in_one_thread
 from discover.loop.from_posterior import Ended, result_of
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Fold
@@ -28,6 +27,7 @@ from discover.loop.preference import with_function_first, with_named_law_first
 from discover.loop.search_time import SearchTime
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
+from discover.processor import in_one_thread
 from discover.progress import Progress, by_time
 from discover.study.data import StudyData, temperature
 from discover.study.declared_model import StudyModel, forward_model

@@ -22,10 +22,10 @@ from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.laws import Fluid
-from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import steady_shear
 from discover.loop.final_model import augmented_fluid, states_of
 from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
+from discover.processor import in_one_thread
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 

@@ -18,7 +18,7 @@ from discover.protocols import strains
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
 from discover.statistics.noise.noise_model import independent_samples, rms
-from discover.statistics.residual import fast_part
+from discover.statistics.noise.whiteness import fast_part
 from discover.words import counted
 
 FEWEST_SAMPLES = 5

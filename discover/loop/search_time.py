@@ -32,7 +32,7 @@ _FIRST, _EXCHANGE = 1.2, 1.4
 _WEIGHED, _WEIGHED_ALONE = _Part(175.0, share=1.05), _Part(15.0)
 # Curves of one variable; bands, intervals and the next test. All these were measured on two cores,
 # with programs that were kept and that were compiled: on LDPE, a polyisoprene melt, a gel, blood,
-# two-mode PTT and noise. Seconds are those of the machine of `slowness`.
+# two-mode PTT and noise.
 _CURVES, _BANDS = _Part(2.0, 0.1), _Part(70.0, 0.1, 1.2, 0.43)
 # A fit of the second search, whose constants differ from mode to mode, over one of the first
 _BY_MODE = 2.0

@@ -14,7 +14,7 @@ from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
-from discover.statistics.residual import fast_part
+from discover.statistics.noise.whiteness import fast_part
 from discover.words import significant
 
 # Effect that is all that such a material has; another law stands for itself

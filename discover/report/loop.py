@@ -29,7 +29,7 @@ from discover.report.plots.loop.runs import (
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.residual import fast_part
+from discover.statistics.noise.whiteness import fast_part
 from discover.study.run_folder import RunFolder
 from discover.words import effect_title, listed, significant
 

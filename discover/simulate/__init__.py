@@ -9,8 +9,7 @@ Examples
 [0.632 1.   ]
 """
 
-from discover import first_use as first_use  # what it sets counts only before equinox is imported
-from discover.callable_package import answer_calls
+from discover.first_use import answer_calls  # first: it sets double precision
 from discover.simulate.solve import SimulationError, observe, simulate
 from discover.simulate.synthetic import synthetic_dataset
 

@@ -12,9 +12,12 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import discover as dc
-from discover import linear_algebra_threads
-from discover.accelerators import use_the_processor_from_the_start
-from discover.linear_algebra_threads import in_one_thread, use_one_thread_from_the_start
+from discover import processor
+from discover.processor import (
+    in_one_thread,
+    use_one_thread_from_the_start,
+    use_the_processor_from_the_start,
+)
 
 HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "equinox")
 
@@ -177,7 +180,7 @@ def threads() -> set[int]:
 
 @pytest.fixture
 def two_threads(monkeypatch):
-    for name in linear_algebra_threads._CHOSEN:
+    for name in processor._CHOSEN:
         monkeypatch.delenv(name, raising=False)
     with threadpool_limits(2, "blas"):
         yield

@@ -27,7 +27,7 @@ from discover.effects import (
     named_effects,
 )
 from discover.effects.kinematic import first_order_lag
-from discover.effects.letters import spelled_apart
+from discover.effects.registry import spelled_apart
 from discover.equations import Equation
 from discover.equations.formats.latex_file import equation_latex
 from discover.equations.parts import StatePart

@@ -5,6 +5,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from explained import explain
 from independent import Giesekus, WhiteMetzner, oscillation, start_up
 from independent.noise import correlated, white
 from noisy_runs import run_at
@@ -14,7 +15,6 @@ from scipy.stats import multivariate_normal, multivariate_t, norm
 import discover as dc
 from discover.effects import library_term, make_effect
 from discover.forward import DeclaredModel
-from discover.inference.engine import explain
 from discover.inference.engine.bands import Predictions, quantiles
 from discover.inference.engine.closed_forms import integrated_rate
 from discover.inference.engine.fit import Fit

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from explained import explain
 from independent.folders import write_folder
 from independent.instruments import Instrument
 from independent.noise import correlated
@@ -11,7 +12,7 @@ from independent.worlds import MODULUS, TIME, draw_world
 
 import discover as dc
 from discover.forward import DeclaredModel
-from discover.inference.engine import Problem, explain
+from discover.inference.engine import Problem
 from discover.inference.engine.design import design
 from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.posterior import _unlike_noise

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from explained import explain
 from independent import Giesekus, PhanThienTanner
 from independent.flow import Flow, oscillation, start_up
 from independent.folders import write_folder
@@ -19,7 +20,7 @@ from vectors import vector_of
 import discover as dc
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.inference.engine import Problem, explain
+from discover.inference.engine import Problem
 from discover.loop.runs import split_runs
 from discover.loop.task import candidates_of
 

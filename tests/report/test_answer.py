@@ -12,7 +12,7 @@ from discover.answer.modes_in_words import linear_part, origin, span, table
 from discover.answer.naming import named_law
 from discover.answer.simple_material import material_of
 from discover.equations import Equation, NamedPart
-from discover.equations.spelling.plain_signs import plain
+from discover.equations.spelling.markup import plain
 from discover.errors import InputError
 from discover.inference.engine.simple_materials import SimpleFit
 from discover.loop.parts import STRUCTURES

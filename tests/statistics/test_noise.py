@@ -7,8 +7,12 @@ from scipy.integrate import solve_ivp
 
 from discover.statistics import independent_samples
 from discover.statistics.noise.outliers import isolated
-from discover.statistics.noise.whiteness import separate_probability, smooth_misfit_probability
-from discover.statistics.residual import fast_part, noise_beside
+from discover.statistics.noise.whiteness import (
+    fast_part,
+    noise_beside,
+    separate_probability,
+    smooth_misfit_probability,
+)
 
 
 def test_noise_is_worth_what_its_correlation_leaves_and_a_trend_a_few_samples():

@@ -11,7 +11,7 @@ from discover.errors import InputError
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.residual import fast_part
+from discover.statistics.noise.whiteness import fast_part
 
 _SAME = 0.02  # relative difference of rates, and of what runs.csv says of two runs, that is none
 _FEWEST_SAMPLES = 10

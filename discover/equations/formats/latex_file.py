@@ -1,6 +1,6 @@
 """An equation as a piece of a LaTeX document, and the plain lines that every file begins with."""
 
-from discover.effects.letters import Spelled
+from discover.effects.registry import Spelled
 from discover.equations.equation import Equation
 from discover.equations.parts import StatePart
 from discover.equations.spelling.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex

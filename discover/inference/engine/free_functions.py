@@ -22,7 +22,7 @@ from discover.inference.engine.problem import TERM_ODDS, Problem
 from discover.inference.engine.search import Search
 from discover.inference.engine.variables import Response, variables
 from discover.inference.engine.with_function import SLIPS, WIDTHS, WithFunction, WithSlip
-from discover.linear_algebra_threads import in_one_thread
+from discover.processor import in_one_thread
 
 _BASES = 12
 """Hypotheses of each size beside which a function is tried to first order."""

@@ -1,11 +1,12 @@
 """Posterior over hypotheses: probabilities, constants, and bands of what was not fitted."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
+from scipy.special import expit
 
 from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import Band, Predictions, quantiles
@@ -17,7 +18,7 @@ from discover.inference.engine.noise import LEAST
 from discover.inference.engine.problem import LOG_ODDS_OF_NONE, Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
-from discover.linear_algebra_threads import in_one_thread
+from discover.processor import in_one_thread
 from discover.statistics.noise.whiteness import FEWEST_TESTED, smooth_misfit_probability
 
 _NEGLIGIBLE = 1e-3
@@ -129,8 +130,7 @@ class Posterior:
 
     def with_curves(self, curves: Sequence[FreeFunction]) -> "Posterior":
         """Return the posterior with functions among what may be there and has no name."""
-        log_odds = float(np.logaddexp.reduce([curve.weight for curve in curves]))
-        share = 1.0 / (1.0 + float(np.exp(min(log_odds, 700.0))))
+        share = float(expit(-np.logaddexp.reduce([curve.weight for curve in curves])))
         explanations = tuple(
             replace(one, probability=share * one.probability) for one in self.explanations
         )
@@ -220,16 +220,6 @@ class Posterior:
     def bands(self, rows: Rows) -> list[Band | None]:
         """Return the bands of runs with their noise, by the fitted runs alone."""
         return Predictions(self, rows, noise=True).bands(self.predicting_best)
-
-
-@in_one_thread
-def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None = None) -> Posterior:
-    """Return the posterior of a problem, hypotheses being sets of up to so many effects.
-
-    `problem`: records, model and candidates. `most`: effects in one set. `say`: called with a line
-    of text now and then.
-    """
-    return posterior_of(Search(Fitter(problem, problem.fitted), most, say).run())
 
 
 @in_one_thread
@@ -373,15 +363,8 @@ def _classes(
                 break
         else:
             noise = fit.noise.sizes[fitter.rows.run]
-            classes.append(
-                {
-                    "record": record,
-                    "noise": noise,
-                    "rank": rank,
-                    "members": [(fit.names, rank)],
-                    "p": p,
-                }
-            )
+            known = {"record": record, "noise": noise, "rank": rank}
+            classes.append(known | {"members": [(fit.names, rank)], "p": p})
     found, lost = [], 0.0
     for one in classes:
         share = float(one["p"])

@@ -30,7 +30,7 @@ from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import SAME, Posterior
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.problem import LOG_ODDS_OF_NONE
-from discover.linear_algebra_threads import in_one_thread
+from discover.processor import in_one_thread
 from discover.protocols.kinematics import MODULI
 
 _NO_MATERIAL = ""
