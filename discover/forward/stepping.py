@@ -89,7 +89,7 @@ def periodic_modes(
     whether it is half a cycle, after which the flow is its own image in the plane across it.
     """
     rest = dynamics.rest()
-    signs = np.ones((len(rest), *(1,) * (rest.ndim - 1)))
+    signs = np.ones(len(rest))
     if mirrored:
         signs[3 : 4 * (1 + dynamics.tensors) : 4] = -1.0
 
@@ -100,7 +100,8 @@ def periodic_modes(
             return jnp.where(number < count, after, stress), None
 
         steps = jnp.arange(len(width)), rate, fluid.weights(width)
-        return signs * jax.lax.scan(step, stress, steps)[0]
+        end = jax.lax.scan(step, stress, steps)[0]
+        return signs.reshape(-1, *(1,) * (end.ndim - 1)) * end
 
     def along(unit):
         direction = unit[:, None] * jnp.ones_like(state)

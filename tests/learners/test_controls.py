@@ -80,7 +80,6 @@ def swing(strain, samples=65, cycles=None, noise=0.0):
     return dc.Run(f"strain {strain:g}", times, protocol, shear_rates(rate, times), stress)
 
 
-@pytest.mark.slow
 def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
     problem = make_training_problem(
         [swing(2.0), run_at(1.0, np.linspace(0.5, 20.0, 40), np.ones(40))],
