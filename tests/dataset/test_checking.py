@@ -266,9 +266,7 @@ def test_the_polyisoprene_folder_is_doubted_where_its_literature_doubts_it(measu
     # early in every run, by the lag of its normal force
     assert normal == {run.name for run in load_dataset(measured_data / "pi95k-startup")}
     seen = load_dataset(measured_data / "pi95k-startup").quantity_by_quantity()
-    # at the two slowest rates nothing is left of it
-    slow = {"pi_Tm10_rate0p01.csv (N1)", "pi_Tm10_rate0p03.csv (N1)"}
-    assert set(seen.set_aside) == slow
+    assert not seen.set_aside  # later samples of each are left
     for run in seen:
         assert run.quantity != "N1" or 0.05 < run.time[0] * run.rate[0] < 1.01
 

@@ -1,11 +1,15 @@
 """What the loop says of creep, curves, sweeps, extension and N1, by scipy and closed forms."""
 
+import json
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from command_line import invoke
 from independent import Giesekus
+from independent import start_up as flow_at
 from independent.folders import maxwell_sweep, write_table
 from independent.homogeneous import GiesekusFluid
 from independent.noise import white
@@ -282,6 +286,35 @@ def test_recorded_n1_that_no_fit_saw_has_an_error_of_its_own():
     assert wrong.answer.expected("N1").inside == pytest.approx(1.0, rel=0.05)
     assert wrong.verdict == result.verdict  # no judgement of σ12 knows of it
     assert wrong.answer.next_test.startswith("Correct N1 for axial compliance, then fit it")
+
+
+def test_a_law_is_used_and_exported_at_the_temperature_of_the_runs(tmp_path):
+    # ten times as fast at 40 °C as at 0 °C, where the sweep is: by scipy, reduced to that
+    shift, reduced, rates = 10.0, TIME * 10.0, {"a": 0.05, "b": 0.1, "c": 0.2, "d": 0.3}
+    law, times = Giesekus(0.3, MODULUS, reduced), np.linspace(0.5, 80.0, 80)
+    lot = np.random.default_rng(1)
+    for name, rate in rates.items():
+        stress = white(law.respond(flow_at(rate), times).sigma12, NOISE, lot)
+        columns = {"time_s": times, "shear_rate_1_s": 0.0 * times + rate, "stress_Pa": stress}
+        write_table(tmp_path / f"{name}.csv", columns)
+    lines = [f"{name}.csv,40,{shift:g}" for name in rates]
+    (tmp_path / "runs.csv").write_text("\n".join(["file,temperature_C,factor", *lines, ""]))
+    sweep = maxwell_sweep([MODULUS], [reduced], np.geomspace(1e-3, 10.0, 30))
+    write_table(tmp_path / "lve.csv", sweep)
+    study = tmp_path / "study.toml"
+    study.write_text(
+        f'[data]\nfolder = "{tmp_path}"\nheld_out = ["d.csv"]\nclock_factor = "factor"\n'
+        'temperature_C = 0\n[model]\nmodes = "lve"\n[loop]\neffects = ["giesekus_mobility"]\n'
+    )
+    invoke("close-loop", study, "--out", tmp_path / "out", "--quiet", code=0)
+    use = json.loads((tmp_path / "out" / "loop.json").read_text())["use"]
+    assert (use["law"], use["temperature_C"]) == ("giesekus", 40.0)
+    assert use["modes"][0]["relaxation_time_s"] == pytest.approx(TIME, rel=0.01)  # of the sweep
+    assert use["shift_factors"] == pytest.approx({"0": 10.0})
+    assert use["range"]["rate_1_s"] == pytest.approx([0.5, 2.0])  # 1/s of the instrument
+    copied = invoke("export", tmp_path / "out", "--format", "rheotool", code=0).output
+    time = float(re.search(r"lambda \[0 0 1 0 0 0 0\] ([\d.]+);", copied)[1])
+    assert time == pytest.approx(TIME, rel=0.01)
 
 
 def test_samples_of_n1_that_no_fluid_can_have_are_not_compared():
