@@ -116,7 +116,16 @@ def parameters_of(name: str) -> dict[str, base.EffectParameter]:
         return {}
 
 
-def spelled_on_a_page(names: Iterable[str]) -> dict[str, "Spelled"]:
+@dataclass(frozen=True)
+class Spelled:
+    """Equation of an effect, the letters of its parameters by name, and of its states, in LaTeX."""
+
+    equation: str
+    symbols: dict[str, str]
+    states: tuple[str, ...] = ()
+
+
+def spelled_on_a_page(names: Iterable[str]) -> dict[str, Spelled]:
     """Return equations and letters of effects with a name, each letter for one constant."""
     found = []
     for name in dict.fromkeys(names):
@@ -223,15 +232,6 @@ def _value(asked: object, parameter: base.EffectParameter, where: str) -> float 
             f"{where}.{parameter.name} must lie between {low:g} and {high:g}{unit}; got {asked:g}."
         )
     return float(asked)
-
-
-@dataclass(frozen=True)
-class Spelled:
-    """Equation of an effect, the letters of its parameters by name, and of its states, in LaTeX."""
-
-    equation: str
-    symbols: dict[str, str]
-    states: tuple[str, ...] = ()
 
 
 def spelled_apart(effects: Iterable[AbstractEffect]) -> dict[str, Spelled]:

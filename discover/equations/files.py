@@ -212,10 +212,23 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
         raise InputError(f"{where}: {error} {again}") from None
 
 
-FORMATS: Mapping[str, Callable[[Equation], str]] = {
-    "python": numpy_code, "sympy": sympy_code, "latex": equation_latex,
-    "json": lambda equation: json_text(equation_to_json(equation)), "rheotool": rheotool_text,
-    "ufl": ufl_code,
+def _free_of_rounding(write: Callable[..., str]) -> Callable[..., str]:
+    """Return a format in which 0.2999999999999975 is 0.3: in twelve digits no rounding is left."""
+
+    def written(equation: Equation, **options: float) -> str:
+        text = write(equation, **options)
+        return _LONG.sub(lambda one: repr(float(f"{float(one[0]):.12g}")), text)
+
+    return written
+
+
+_LONG = re.compile(r"\d+\.\d{10,}(e-?\d+)?")
+
+FORMATS: Mapping[str, Callable[..., str]] = {
+    "python": _free_of_rounding(numpy_code), "sympy": _free_of_rounding(sympy_code),
+    "latex": _free_of_rounding(equation_latex),
+    "json": lambda equation: json_text(equation_to_json(equation)),
+    "rheotool": _free_of_rounding(rheotool_text), "ufl": _free_of_rounding(ufl_code),
 }  # fmt: skip
 """Functions that write an equation, by the name of the format."""
 
@@ -235,10 +248,6 @@ def write_equation(
         equation = replace(equation, notes=(*equation.notes, *notes))
     options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
     given = {name: value for name, value in options.items() if value is not None}
-    if form == "json":
-        return FORMATS[form](equation)
     if given and form != "rheotool":
         raise InputError(f"Density and tolerance are for --format rheotool; got --format {form}.")
-    text = FORMATS[form](equation) if form != "rheotool" else rheotool_text(equation, **given)
-    # 0.2999999999999975 is 0.3: twelve digits are free of rounding
-    return re.sub(r"\d+\.\d{10,}(e-?\d+)?", lambda one: repr(float(f"{float(one[0]):.12g}")), text)
+    return FORMATS[form](equation, **given)

@@ -11,7 +11,7 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.of_fluids import bare_run
 from discover.inference.engine import Posterior
-from discover.inference.engine.bands import Predictions
+from discover.inference.engine.bands import LOST, Predictions
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.rows import Rows
@@ -21,7 +21,6 @@ from discover.protocols import in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
 
 _LAWS = 20
-_MOST_OF_THEM = 0.5  # Share of laws that a flow must leave
 # Of the runs, as which they count where laws are weighed that were fitted to them and are all
 # wrong: on development seeds with one and less, bands of N1 hold 92 and 98 % of the samples
 _TEMPERED = 0.5
@@ -82,7 +81,7 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             square = np.mean(sum(squares, np.zeros_like(own)), axis=0) / share
             size = np.sqrt(np.mean(own**2, axis=0))
             over_n1 = np.copysign(size[2], own[:, 1] @ own[:, 2]) / size[1]
-            apart = np.sqrt(square) / size[[0, 1, 1]] if share >= _MOST_OF_THEM else np.nan * size
+            apart = np.sqrt(square) / size[[0, 1, 1]] if share >= LOST else np.nan * size
             found.append((size, apart, over_n1))
     size, apart, ratios = (np.array(each) for each in zip(*found, strict=True))
     falls, steady = steady_shear(posterior.problem.model, best.theta, rates)

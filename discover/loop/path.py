@@ -181,9 +181,8 @@ class Path:
             each = [self.predicted(fit, rows, held_out) for fit in fits]
             for i, record in enumerate(records):
                 n = len(record.time)
-                own = bands[i]
-                band = None if own is None else np.stack([own.low, own.high])[..., 0]
-                own = np.stack([one[i, :n] for one in each]) if each else None
+                ends, own = bands[i], np.stack([one[i, :n] for one in each]) if each else None
+                band = None if ends is None else np.stack([ends.low, ends.high])[..., 0]
                 found.append(replace(record, band=band, by_explanation=own))
         return found
 

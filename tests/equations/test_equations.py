@@ -118,7 +118,15 @@ def test_a_number_is_written_without_the_rounding_of_the_machine_and_json_keeps_
     value = 0.2999999999999975
     law = equations.Equation((LawTerm("sigma.sigma", value),), (value,), (value,), True, value)
     assert "9999" not in equations.write_equation(law, form)
+    assert "9999" not in equations.FORMATS[form](law)  # as buttons of a page copy it
     assert str(value) in equations.write_equation(law, "json")
+
+
+def test_density_is_refused_for_a_format_that_has_none():
+    law = equations.Equation((LawTerm("sigma.sigma", 0.3),))
+    for form in ("json", "python"):
+        with pytest.raises(InputError, match="Density and tolerance are for --format rheotool"):
+            equations.write_equation(law, form, density_kg_m3=1000.0)
 
 
 @pytest.mark.parametrize("name", NAMED)

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from discover.effects import AbstractEffect
+from discover.effects import AbstractEffect, KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
 from discover.forward.side_by_side.code import Code, Packed
@@ -122,14 +122,14 @@ class LanePredictor:
 class StatePredictor(LanePredictor):
     """Predictions of states, steady or periodic, each of which is a lane of its own.
 
-    `shaping`: effects that shape the rate. `rates`: the felt rates, of vectors as `per_run` has
-    them, the effects present, the commanded rates of runs and their flow.
+    `rates`: the felt rates, of vectors as `per_run` has them, the effects present, the commanded
+    rates of runs and their flow.
     """
 
-    def __init__(
-        self, fluid: AugmentedFluid, code: Code, shaping: Iterable[AbstractEffect], rates: Callable
-    ):
+    def __init__(self, fluid: AugmentedFluid, code: Code, rates: Callable):
         super().__init__(fluid, code)
+        self._acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
+        shaping = [e for e in self._acting if isinstance(e, KinematicEffect)]
         self._shaping, self._rates = self._amplitudes(shaping), rates
 
     def _felt(self, asked: Asked, commanded: np.ndarray, flow: Any = None) -> np.ndarray:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import KinematicEffect, SignalEffect
+from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.flows import SteadyFlows
 from discover.forward.side_by_side.code import Code, lanes_last
@@ -231,10 +231,8 @@ class SteadySideBySide(StatePredictor):
         rates: Callable,
         recorded: Callable,
     ):
-        acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
-        shaping = [e for e in acting if isinstance(e, KinematicEffect)]
-        super().__init__(fluid, code, shaping, rates)
-        self._distorting = self._amplitudes(e for e in acting if isinstance(e, SignalEffect))
+        super().__init__(fluid, code, rates)
+        self._distorting = self._amplitudes(e for e in self._acting if isinstance(e, SignalEffect))
         self._recorded = recorded
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:

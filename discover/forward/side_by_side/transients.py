@@ -186,9 +186,7 @@ class PeriodicSideBySide(StatePredictor):
         given_way: Callable,
         recorded: Callable,
     ):
-        acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
-        shaping = [e for e in acting if isinstance(e, KinematicEffect)]
-        super().__init__(fluid, code, shaping, rates)
+        super().__init__(fluid, code, rates)
         self._series = self._amplitudes(fluid.series)
         others = self._amplitudes(e for e in fluid.states if not e.acts_on_steady_states)
         self._still = [*others, *self._series]

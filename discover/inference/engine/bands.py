@@ -25,7 +25,7 @@ _RUNS_AWAY = 10.0
 _LEAST = 1e-3
 """Weight below which a hypothesis changes no band."""
 
-_LOST = 0.5
+LOST = 0.5
 """Weight of hypotheses that may diverge in a run in which the others still make a band."""
 
 _POWERS = np.array([1.0, 2.0, 2.0])
@@ -219,7 +219,7 @@ class Predictions:
         """Return the mixture in one run of the hypotheses that can be followed there."""
         at, some = self.rows.run == run, [part for part in parts if part.sound[run]]
         kept, total = (sum(part.weight for part in one) for one in (some, parts))
-        if not some or kept < _LOST * total:
+        if not some or kept < LOST * total:
             return None
         middles = np.array([part.middle[at].ravel() for part in some])
         variances = np.array([part.variance[at].ravel() for part in some])

@@ -19,11 +19,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
-from scipy.linalg import get_lapack_funcs
 
 from discover.dataset import Run
 from discover.protocols import strains
 from discover.protocols.kinematics import MODULI
+from discover.statistics.noise.noise_model import first_order
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
 HERSCHEL_BULKLEY, POWER_LAW = "herschel_bulkley", "power_law"
@@ -128,8 +128,4 @@ def _relaxing(
     before = np.concatenate([rates[:1], rates[:-1]])
     kept = np.exp(-step / time)
     gained = 0.5 * (before + rates) * time * (-np.expm1(-step / time))
-    # each value less what is kept of the one before: two diagonals
-    bands = np.stack([np.ones(len(step)), -np.append(kept[1:], 0.0)])
-    (solve,) = get_lapack_funcs(("tbtrs",), (bands,))
-    stress, _ = solve(bands, gained[:, None], uplo="L")
-    return stress[:, 0]
+    return first_order(kept, gained)

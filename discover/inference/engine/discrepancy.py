@@ -1,4 +1,4 @@
-"""DiscrepancyModel: what no hypothesis holds, in the law and in the records, with a size.
+"""Discrepancy: what no hypothesis holds, in the law and in the records, with a size.
 
 To first order about a fit the records are
 

@@ -1,10 +1,11 @@
-"""Sizes of sequences: root mean square, samples that count, how often a value is read."""
+"""Sizes of sequences, samples that count, how often a value is read; first-order sequences."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
+from scipy.linalg import get_lapack_funcs
 
 Rows = Float[np.ndarray, "runs n"] | Sequence[Float[np.ndarray, " _"]]
 """One sequence for each run."""
@@ -52,6 +53,20 @@ def read_times(record: Float[np.ndarray, " n"]) -> int:
         return 1
     often = int(np.median(lengths))
     return often if np.mean(lengths == often) > _ALIKE else 1
+
+
+def first_order(
+    kept: Float[np.ndarray, " n"], gained: Float[np.ndarray, "n ..."]
+) -> Float[np.ndarray, "n ..."]:
+    """Return sequences of which each value is a share of the one before, and what was gained.
+
+    `kept`: the shares, the first of nothing. `gained`: of one sequence, or a column of each.
+    """
+    # each value less what is kept of the one before: two diagonals
+    bands = np.stack([np.ones(len(kept)), -np.append(kept[1:], 0.0)])
+    (solve,) = get_lapack_funcs(("tbtrs",), (bands,))
+    found, _ = solve(bands, gained.reshape(len(kept), -1), uplo="L")
+    return found.reshape(gained.shape)
 
 
 def rms(values: ArrayLike) -> float:

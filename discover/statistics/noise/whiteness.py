@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.fft import dct
 from scipy.special import gammaincc
 
-from discover.statistics.noise.noise_model import Rows, rms
+from discover.statistics.noise.noise_model import Rows, first_order, rms
 
 FEWEST_TESTED = 24
 """Samples of a run from which on its noise can be told from a smooth misfit."""
@@ -53,10 +53,7 @@ def _redrawn(
     for row in rows:
         new = row - rho * np.append(0.0, row[:-1])
         signs = generator.choice([-1.0, 1.0], (_DRAWS, len(row)))
-        one = signs * new
-        for i in range(1, len(row)):
-            one[:, i] += rho * one[:, i - 1]
-        drawn.append(one)
+        drawn.append(first_order(np.full(len(row), rho), (signs * new).T).T)
     return drawn
 
 
