@@ -40,8 +40,8 @@ _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 def check_folder(folder: str | Path, clock_factor: str | None = None) -> Findings:
     """Return what is wrong, doubtful or worth knowing about a data folder; errors come first.
 
-    Nothing is simulated: a run is compared with itself, with what a passive fluid at rest can do,
-    and with linear viscoelasticity. `folder`, `clock_factor`: as in `load_dataset`.
+    A run is compared with itself, with what a passive fluid at rest can do, and with linear
+    viscoelasticity. `folder`, `clock_factor`: as in `load_dataset`.
 
     Examples
     --------
