@@ -12,19 +12,15 @@ from discover.laws.textbook.classical import (
     Giesekus,
     JohnsonSegalman,
     LinearPhanThienTanner,
+    Saramito,
     fene_p,
     fene_p_terms,
 )
-from discover.laws.textbook.scaled_relaxation import Saramito
 from tensor_library import LawTerm, identity_like, inner
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):
-    """Adds c tr(σ·γ̇)[(1 + β)σ + I] [Likhtman & Graham 2003, JNNFM 114, 1].
-
-    c = 1/3 is Rolie–Poly without stretch; β = 0 are partly retracting strands, with c = 1/3 rigid
-    rods [Larson 1984, J. Rheol. 28, 545].
-    """
+    """Adds c tr(σ·γ̇)[(1 + β)σ + I] [Likhtman & Graham 2003; β = 0: Larson 1984, J. Rheol. 28]."""
 
     def extra_term(self, values, stress, rate):
         release = (1.0 + values[1]) * stress + identity_like(stress)
@@ -62,11 +58,7 @@ CONVECTIVE_CONSTRAINT_RELEASE = ConvectiveConstraintRelease(
 
 
 class FiniteExtensibility(ConstitutiveEffect):
-    """Turns the Maxwell law into FENE-P [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
-
-    In stress form, with q = 1/L² and f = 1 + q tr σ: the term of `discover.laws.FenePeterlin` with
-    1 − q tr A = (1 − 3q)/f. Its rate comes from eliminating A, so the law stays well-posed.
-    """
+    """Turns Maxwell into FENE-P with q = 1/L²   [Bird, Dotson & Johnson 1980, JNNFM 7, 213]."""
 
     def extra_term(self, values, stress, rate):
         return fene_p(values[0], 1.0 - 3.0 * values[0], stress, rate)
@@ -172,12 +164,9 @@ _AT_REST = 1e-300
 
 
 class StrainDamping(ConstitutiveEffect):
-    """Adds n λ|γ̇| (σ + I), with |γ̇|² = ½ γ̇:γ̇.
+    """Adds n λ|γ̇| (σ + I), |γ̇|² = ½ γ̇:γ̇: strands lost for good [Wagner & Stephenson 1979].
 
-    After a strain γ the share e^{−nγ} of the strands carries stress: where the flow does not turn,
-    K-BKZ with Wagner's damping function [Wagner 1976, Rheol. Acta 15, 136]. Strain adds up without
-    regard to sign: lost strands do not come back [after Wagner & Stephenson 1979, J. Rheol. 23,
-    489].
+    Where the flow does not turn, K-BKZ with Wagner's damping function e^{−nγ} [Wagner 1976].
     """
 
     # Finger's and Cauchy's tensor in any proportion have one σ12 and N1   [Wagner & Demarmels 1990]

@@ -1,15 +1,10 @@
-"""Laws as Python text with numpy or SymPy alone.
-
-Made of tables and of `repr` of numbers; names of files or studies occur in comments only. ``@`` and
-``trace()`` serve numpy and SymPy alike; UFL changes a few entries.
-"""
+"""Laws as Python text with numpy or SymPy alone, of tables and `repr` of numbers; base of UFL."""
 
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.equations.equation import Equation
-from discover.equations.formats.latex_file import header_lines
 from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
@@ -277,11 +272,7 @@ def filled(
     template: str, equation: Equation, notation: CodeNotation, nothing: str,
     constants: str | None = None, indent: str = "    ",
 ) -> str:  # fmt: skip
-    """Return a module: a template with the law in a notation.
-
-    `constants`: of a named law, as text; by default a list with a table for each mode.
-    `indent`: of what stands in functions; empty where nothing does.
-    """
+    """Fill a template with the law; `constants` of a named law as text, by default a table."""
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
     lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]
@@ -307,7 +298,7 @@ def filled(
     ]
     last = 9 + len(variables)
     return "".join(kept).format(
-        header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
+        header="\n".join(equation.header) or "Where it was tested is not recorded.",
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes=repr([(float(g), float(time)) for g, time in pairs]),
