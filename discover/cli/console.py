@@ -43,10 +43,7 @@ class _HeardOrNot(io.FileIO):
 
 
 def heard_or_not(stream: Any) -> Any:
-    """Return a standard stream that takes any character, and lets its reader leave early.
-
-    Characters that a terminal does not know, such as σ, are spelled out.
-    """
+    """Return a standard stream that spells out unknown characters, and lets its reader leave."""
     if not isinstance(stream, io.TextIOWrapper):  # somebody's own, or none at all
         return stream
     try:
@@ -84,10 +81,7 @@ def _one_line(text: str) -> str:
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Report]:
-    """Yield a function of what is going on and the fraction done, 0 to 1.
-
-    Draws nothing when `quiet`, or when standard error is not a terminal.
-    """
+    """Yield a function of what goes on and the fraction done; silent if `quiet` or no terminal."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -150,9 +144,8 @@ _PATIENCE = 4.0  # seconds for last words
 def obeying_interrupts() -> Iterator[None]:
     """End the process within about a second of Ctrl-C, with one line and `INTERRUPTED_CODE`.
 
-    Python alone raises an exception between two instructions of the main thread: never while a
-    program is compiled, and it is lost in a library's callback. So a thread listens and ends the
-    process. Does nothing outside the main thread, or where somebody handles the signal already.
+    Python raises between two instructions of the main thread alone: never while a program compiles.
+    So a thread listens. Nothing outside the main thread, or where the signal is handled already.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
