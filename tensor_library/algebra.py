@@ -78,7 +78,7 @@ def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
 
 
 def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float[Array, "..."]:
-    """Return Σᵢ first[…, i] second[i, …], as no product of matrices, which XLA starts by itself."""
+    """Return Σᵢ first[…, i] second[i, …] without a product of matrices, which XLA starts apart."""
     columns = (1,) * (second.ndim - 1)
     return jnp.sum(first.reshape(first.shape + columns) * second, axis=first.ndim - 1)
 

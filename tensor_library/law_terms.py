@@ -79,7 +79,7 @@ class LawTerms:
 
     @classmethod
     def of(cls, terms: Iterable[LawTerm]) -> "LawTerms":
-        """Sum; ValueError if a term stands twice, or an inner parameter has two values."""
+        """Add terms up; ValueError if one stands twice, or an inner parameter has two values."""
         coefficients: dict[str, float] = {}
         inner: dict[str, float] = {}
         for term in terms:

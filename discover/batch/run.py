@@ -147,7 +147,7 @@ def run_batch(
 
 
 def folder_names(paths: Sequence[Path]) -> list[str]:
-    """Folder names of studies: stems, with their folders' where needed; InputError on two."""
+    """Return folder names of studies: stems, with folders where these repeat; or InputError."""
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     times = Counter(stem.casefold() for stem in stems)
     names = [

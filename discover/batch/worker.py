@@ -1,4 +1,4 @@
-"""A process that runs studies for `discover.batch.workers`, told and telling in lines of JSON."""
+"""A process that runs studies for `discover.batch.workers`, by lines of JSON on its two pipes."""
 
 import json
 import os

@@ -14,7 +14,7 @@ from typer import Argument, Option
 
 from discover._version import __version__
 from discover.cli import console
-from discover.cli.console import heard_or_not, obeying_interrupts, progress_bar
+from discover.cli.console import Number, Place, Text, Texts, progress_bar
 from discover.cli.data_commands import data_app
 from discover.errors import InputError
 from discover.processor import use_one_thread_from_the_start, use_the_processor_from_the_start
@@ -99,14 +99,10 @@ app.command("close-loop")(
 def batch(
     studies: Annotated[list[Path], Argument(help="Study files.", show_default=False)],
     out: Annotated[
-        Path | None, Option("--out", "-o", help="Folder for the results; default: results/batch.")
+        Place, Option("--out", "-o", help="Folder for the results; default: results/batch.")
     ] = None,
-    workers: Annotated[
-        int, Option(min=1, max=1024, help="Number of processes on this machine.")
-    ] = 1,
-    scheduler: Annotated[
-        str | None, Option(help="Address of a dask scheduler, tls://host:port.")
-    ] = None,
+    workers: Annotated[int, Option(min=1, max=1024, help="Processes on this machine.")] = 1,
+    scheduler: Annotated[Text, Option(help="Address of a dask scheduler, tls://host:port.")] = None,
     seed: console.SeedOption = None,
     quiet: console.QuietOption = False,
     as_json: console.JsonOption = False,
@@ -133,16 +129,12 @@ def batch(
 def fit(
     law: Annotated[str, Argument(help="Name of the law; see: discover laws.")],
     data: Annotated[Path, Argument(metavar="folder", help="Data folder.")],
-    held_out: Annotated[console.Texts, Option(help="Run that only tests the fit.")] = None,
-    bounds: Annotated[console.Texts, Option(help="Range of a constant: alpha=0:0.5.")] = None,
-    start: Annotated[console.Texts, Option(help="Start of a constant: alpha=0.2.")] = None,
-    fixed: Annotated[
-        console.Texts, Option("--fix", help="Constant that is not fitted: alpha=0.2.")
-    ] = None,
+    held_out: Annotated[Texts, Option(help="Run that only tests the fit.")] = None,
+    bounds: Annotated[Texts, Option(help="Range of a constant: alpha=0:0.5.")] = None,
+    start: Annotated[Texts, Option(help="Start of a constant: alpha=0.2.")] = None,
+    fixed: Annotated[Texts, Option("--fix", help="Constant that is not fitted: alpha=0.2.")] = None,
     solvent: Annotated[bool, Option("--solvent", help="Also fit a solvent viscosity.")] = False,
-    out: Annotated[
-        Path | None, Option("--out", "-o", help="Folder for page, JSON and equation.")
-    ] = None,
+    out: Annotated[Place, Option("--out", "-o", help="Folder for page, JSON, equation.")] = None,
     quiet: console.QuietOption = False,
     as_json: console.JsonOption = False,
     overwrite: console.OverwriteOption = False,
@@ -209,29 +201,15 @@ def _bounds(name: str, text: str) -> tuple[float, float]:
 @app.command("export")
 @console.guarded
 def export(
-    results: Annotated[
-        Path,
-        Argument(help="Result folder of a compare, close-loop or fit.", show_default=False),
-    ],
+    results: Annotated[Path, Argument(help="Folder of results.", show_default=False)],
     form: Annotated[
         str, Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")
     ] = "python",
-    law: Annotated[
-        str | None, Option(help="Learner whose law to write; default: the law of the answer.")
-    ] = None,
-    out: Annotated[
-        Path | None, Option("--out", "-o", help="File to write; default: standard output.")
-    ] = None,
-    density: Annotated[
-        float | None, Option(min=0.0, help="Density in kg/m3, for rheotool; default: 1000.")
-    ] = None,
+    law: Annotated[Text, Option(help="Learner whose law to write; default: the answer's.")] = None,
+    out: Annotated[Place, Option("--out", "-o", help="File; default: standard output.")] = None,
+    density: Annotated[Number, Option(min=0.0, help="kg/m3, for rheotool; default: 1000.")] = None,
     tolerance: Annotated[
-        float | None,
-        Option(
-            min=0.0,
-            max=0.5,
-            help="For rheotool: accepted deviation from a law it knows; default: 0.01.",
-        ),
+        Number, Option(min=0.0, max=0.5, help="For rheotool: accepted deviation; default: 0.01.")
     ] = None,
     overwrite: Annotated[bool, Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
@@ -324,7 +302,7 @@ def _one_line(message: Warning | str, *rest: object, **options: object) -> str:
 
 def main() -> None:
     """Run the command line."""
-    sys.stdout, sys.stderr = heard_or_not(sys.stdout), heard_or_not(sys.stderr)
+    sys.stdout, sys.stderr = console.heard_or_not(sys.stdout), console.heard_or_not(sys.stderr)
     keep_out_of_the_working_directory()
     warnings.formatwarning = _one_line
     # numbers that overflow in a trial: the search goes on, and a user cannot act on it
@@ -333,7 +311,7 @@ def main() -> None:
     use_the_processor_from_the_start()
     # tracing makes millions of small objects that stay, and each full collection walks all of them
     gc.set_threshold(100_000, 50, 100)
-    with obeying_interrupts():
+    with console.obeying_interrupts():
         try:
             app(prog_name="discover")
         finally:

@@ -249,13 +249,13 @@ def number(text: str, where: str) -> float:
     return float(text)
 
 
-Texts = list[str] | None
-"""An option that may be given several times."""
+Text, Texts, Number, Place = str | None, list[str] | None, float | None, Path | None
+"""Options that may be left out; of several texts, one that may be given several times."""
 StudyArgument = Annotated[
     Path, Argument(help="Study file (TOML); discover data import writes one.", show_default=False)
 ]
 OutOption = Annotated[
-    Path | None, Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
+    Place, Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]
 SeedOption = Annotated[
     int | None,
@@ -265,6 +265,5 @@ QuietOption = Annotated[bool, Option("--quiet", "-q", help="Print no progress an
 JsonOption = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 OverwriteOption = Annotated[bool, Option("--overwrite", help="Start again instead of resuming.")]
 ToleranceOption = Annotated[
-    float | None,
-    Option(help="Relative misfit that you accept; default: the study's, or 0.05."),
+    Number, Option(help="Relative misfit that you accept; default: the study's, or 0.05.")
 ]

@@ -27,6 +27,8 @@ class WrittenState:
 
 
 Kind = Literal["constitutive", "kinematic", "signal"]
+Constants, Rates = Float[Array, " p"], Float[Array, " n"]
+Number, Levels = Float[Array, ""], Float[Array, "*levels"]
 
 Scale = Literal[
     "one", "sampling_time", "run_time", "inverse_rate", "strain", "stress", "inverse_stress",
@@ -115,7 +117,7 @@ class ConstitutiveEffect(AbstractEffect):
         """Whether there is an `extra_term`."""
         return type(self).extra_term is not ConstitutiveEffect.extra_term
 
-    def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):
+    def extra_term(self, values: Constants, stress: Symmetric, rate: Symmetric):
         """Summand of h of one mode, dimensionless, from σ_k/G_k and λ_k γ̇, (3, 3) or (4,)."""
         del values, rate
         return jnp.zeros_like(stress)
@@ -125,9 +127,7 @@ class ConstitutiveEffect(AbstractEffect):
         del values
         return None if self.adds_term else ()
 
-    def instantaneous_stress(
-        self, values: Float[Array, " p"], shear_rate: Float[Array, " n"]
-    ) -> Float[Array, " n"]:
+    def instantaneous_stress(self, values: Constants, shear_rate: Rates) -> Rates:
         """Return the shear stress in Pa that the effect adds beside the modes."""
         del values
         return jnp.zeros_like(shear_rate)
@@ -137,7 +137,7 @@ class ModeEffect(ConstitutiveEffect):
     """Relaxation mode beside the declared ones, under the same law."""
 
     @abstractmethod
-    def mode(self, values: Float[Array, " p"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    def mode(self, values: Constants) -> tuple[Number, Number]:
         """Return its modulus in Pa and its relaxation time in s."""
 
 
@@ -157,8 +157,8 @@ class StateEffect(ConstitutiveEffect):
 
     @abstractmethod
     def source_and_decay(
-        self, values: Float[Array, " p"], shear_rate: Float[Array, ""], stress: Float[Array, ""]
-    ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
+        self, values: Constants, shear_rate: Number, stress: Number
+    ) -> tuple[Levels, Levels]:
         """Return source and decay in 1/s, from `shear_rate` in 1/s and `stress` in Pa."""
 
     @property
@@ -172,16 +172,12 @@ class StateEffect(ConstitutiveEffect):
         """Return the state as expressions, for exports; None where nobody said."""
         return None
 
-    def modulus_factor(
-        self, values: Float[Array, " p"], state: Float[Array, "*levels"]
-    ) -> Float[Array, ""]:
+    def modulus_factor(self, values: Constants, state: Levels) -> Number:
         """Return the factor on the stress of all modes."""
         del values, state
         return jnp.ones(())
 
-    def time_factor(
-        self, values: Float[Array, " p"], state: Float[Array, "*levels"]
-    ) -> Float[Array, ""]:
+    def time_factor(self, values: Constants, state: Levels) -> Number:
         """Return the factor on all relaxation times."""
         del values, state
         return jnp.ones(())
@@ -265,9 +261,7 @@ class SeriesElement(KinematicEffect):
     """Element in series with the fluid, solved with the stress: γ̇_felt = γ̇ − s σ − C dσ/dt."""
 
     @abstractmethod
-    def slip_and_compliance(
-        self, values: Float[Array, " p"]
-    ) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    def slip_and_compliance(self, values: Constants) -> tuple[Number, Number]:
         """Return s in 1/(Pa s) and C in 1/Pa."""
 
     @property
@@ -275,7 +269,7 @@ class SeriesElement(KinematicEffect):
         """Whether there is a `slip_at`."""
         return type(self).slip_at is not SeriesElement.slip_at
 
-    def slip_at(self, values: Float[Array, " p"], stress: Float[Array, ""]) -> Float[Array, ""]:
+    def slip_at(self, values: Constants, stress: Number) -> Number:
         """Return what the slip s in 1/(Pa s) is beyond its constant, at a stress in Pa."""
         del stress
         return jnp.zeros_like(values[0])
@@ -296,9 +290,7 @@ class SignalEffect(AbstractEffect):
     def recorded_stress(self, values: Values, record: Record) -> Signal:
         """Return the stress recorded, from the one that would be recorded without this effect."""
 
-    def response(
-        self, values: Float[Array, " p"], frequency: Float[Array, ""]
-    ) -> Complex[Array, ""] | Float[Array, ""]:
+    def response(self, values: Constants, frequency: Number) -> Complex[Array, ""] | Number:
         """Return the factor on the stress of a periodic oscillation at `frequency` in rad/s."""
         del frequency
         return jnp.ones_like(values[0])

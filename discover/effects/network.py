@@ -7,15 +7,7 @@ import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter, ModeEffect
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.textbook.classical import (
-    ExponentialPhanThienTanner,
-    Giesekus,
-    JohnsonSegalman,
-    LinearPhanThienTanner,
-    Saramito,
-    fene_p,
-    fene_p_terms,
-)
+from discover.laws.textbook import classical
 from tensor_library import LawTerm, identity_like, inner
 
 
@@ -61,10 +53,10 @@ class FiniteExtensibility(ConstitutiveEffect):
     """Turns Maxwell into FENE-P with q = 1/L²   [Bird, Dotson & Johnson 1980, JNNFM 7, 213]."""
 
     def extra_term(self, values, stress, rate):
-        return fene_p(values[0], 1.0 - 3.0 * values[0], stress, rate)
+        return classical.fene_p(values[0], 1.0 - 3.0 * values[0], stress, rate)
 
     def as_terms(self, values):
-        return fene_p_terms(values[0])
+        return classical.fene_p_terms(values[0])
 
 
 FINITE_EXTENSIBILITY = FiniteExtensibility(
@@ -100,7 +92,7 @@ class AddedLaw(ConstitutiveEffect):
 
 
 GIESEKUS_MOBILITY = AddedLaw(
-    name="giesekus_mobility", law=Giesekus,
+    name="giesekus_mobility", law=classical.Giesekus,
     parameters=(
         EffectParameter(
             "alpha", r"\alpha", meaning="mobility", low=0.0, high=1.0, first_trial=0.01,
@@ -115,7 +107,7 @@ GIESEKUS_MOBILITY = AddedLaw(
 
 
 NON_AFFINE_MOTION = AddedLaw(
-    name="non_affine_motion", law=JohnsonSegalman, explicit_rate=True,
+    name="non_affine_motion", law=classical.JohnsonSegalman, explicit_rate=True,
     parameters=(
         EffectParameter(
             "xi", r"\xi", meaning="slip of the network", low=0.0, high=1.0, first_trial=0.01,
@@ -140,7 +132,7 @@ _ELONGATION = EffectParameter(
 
 
 PTT_EXPONENTIAL = AddedLaw(
-    name="ptt_exponential", law=ExponentialPhanThienTanner, complexity=2,
+    name="ptt_exponential", law=classical.ExponentialPhanThienTanner, complexity=2,
     parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
     source="Phan-Thien 1978, J. Rheol. 22, 259",
@@ -150,7 +142,7 @@ PTT_EXPONENTIAL = AddedLaw(
 
 
 PTT_LINEAR = AddedLaw(
-    name="ptt_linear", law=LinearPhanThienTanner,
+    name="ptt_linear", law=classical.LinearPhanThienTanner,
     parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
     source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
@@ -196,7 +188,7 @@ STRAIN_DAMPING = StrainDamping(
 
 # only the stress beyond yield relaxes, with the factor max(0, 1 − Y/|σ_d|)
 YIELD_STRESS = AddedLaw(
-    name="yield_stress", law=Saramito, complexity=2,
+    name="yield_stress", law=classical.Saramito, complexity=2,
     parameters=(
         EffectParameter(
             "yield_strain", "Y", low=0.0, high=10.0, first_trial=0.01,

@@ -217,7 +217,7 @@ STRESS_OFFSET = StressOffset(
 
 
 class TimeDelay(SignalEffect):
-    """The stress recorded is the true one earlier on the instrument's clock, first zero."""
+    """The stress recorded is the true one earlier on the instrument's clock, zero at first."""
 
     takes_numpy = True
 

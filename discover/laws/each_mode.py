@@ -107,7 +107,7 @@ def with_modes(
     before: Float[Array, " k"] | np.ndarray,
     after: Float[Array, " m"] | np.ndarray,
 ) -> AbstractConstitutiveLaw:
-    """Return a law of modes with times `before` (s) as of others, constants linear in log λ."""
+    """Interpolate a law of modes with times `before` to times `after`, in s, linearly in log λ."""
 
     def of_times(part):
         if not isinstance(part, LawOfEachMode):

@@ -111,7 +111,7 @@ def _observed(
     dataset: Dataset, observe: Sequence[str], held_out: Sequence[str], fit: Sequence[str],
     asked: Sequence[str],
 ) -> tuple[Dataset, list[str], list[str]]:  # fmt: skip
-    """Return a record a quantity, those held out, and those fitted; `asked` must have some."""
+    """Return every quantity as a record, those held out, those fitted; `asked` must have some."""
     whole = dataset.quantity_by_quantity()
     missing = set(observe) - {run.quantity for run in whole}
     if missing:

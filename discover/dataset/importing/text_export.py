@@ -111,7 +111,7 @@ def require_blocks(blocks: list[Block], name: str) -> list[Block]:
 
 
 def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
-    """Blocks of numbers among the cells of each line; of `header_row`, that of the names, one."""
+    """Return blocks of numbers among cells of lines; one below `header_row`, the line of names."""
     blocks: list[Block] = []
     header: _Columns | None = None
     over: tuple[str, ...] = ()

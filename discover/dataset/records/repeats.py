@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.records.thinning import nearest
 from discover.dataset.run import LARGEST, Run
 from discover.errors import InputError
 from discover.protocols.kinematics import STATES
@@ -98,10 +99,7 @@ def is_copy(one: Run, other: Run) -> bool:
     if len(fewer) < _FEWEST:
         same = np.array_equal(one.time, other.time)
         return same and np.array_equal(one.recorded, other.recorded)
-    at = np.clip(np.searchsorted(more.time, fewer.time), 0, len(more) - 1)
-    at = np.where(
-        np.abs(more.time[at - 1] - fewer.time) < np.abs(more.time[at] - fewer.time), at - 1, at
-    )
+    at = nearest(more.time, fewer.time)
     close = np.abs(more.time[at] - fewer.time) <= 1e-6 * max(float(fewer.time[-1]), 1e-300)
     if np.mean(close) < 0.9 or np.count_nonzero(close) < _FEWEST:
         return False
@@ -148,7 +146,7 @@ def total_strain(run: Run) -> float:
 
 
 def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
-    """Give runs the strain of those earlier in `order`, of start times; equals are parallel."""
+    """Return runs with the strain of those before in `order`, such as start times."""
     totals = np.array([total_strain(run) for run in runs])
     return tuple(
         replace(run, strain_before=float(np.sum(totals[order < at])))

@@ -31,8 +31,8 @@ def thin(
     keep[[0, -1]] = True
     half = (MOST_SAMPLES - 6) // 2
     positive = time[time > 0]
-    keep[_nearest(time, np.geomspace(positive[0], positive[-1], half))] = True
-    keep[_nearest(time, np.linspace(time[0], time[-1], half))] = True
+    keep[nearest(time, np.geomspace(positive[0], positive[-1], half))] = True
+    keep[nearest(time, np.linspace(time[0], time[-1], half))] = True
     for values in (shear_stress, shear_rate):
         keep[[int(np.argmin(values)), int(np.argmax(values))]] = True
     return keep, (
@@ -49,7 +49,7 @@ def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
 
 
 def thin_run(run: Run, most: int) -> Run:
-    """Run with at most so many samples, 2 or more, even; a rate read in samples is followed."""
+    """Thin a run evenly to so many samples, 2 or more; its rate is a `followed_rate`."""
     n = len(run)
     if n <= most:
         return run
@@ -97,9 +97,9 @@ def followed_rate(
     return time, shear_rate
 
 
-def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    return after - (wanted - time[after - 1] < time[after] - wanted)
+def nearest(time: Float[np.ndarray, " n"], wanted: np.ndarray) -> np.ndarray:
+    """Return the places of the times, increasing, that are nearest to those wanted."""
+    return np.searchsorted(0.5 * (time[1:] + time[:-1]), wanted)
 
 
 # The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4
@@ -134,7 +134,7 @@ def without_spikes(run: Run) -> tuple[Run, list[float]]:
 
 
 def without_held_values(run: Run) -> Run:
-    """Run with the first sample of each value, where values are held: a late one is a lag."""
+    """Keep the first sample of each value that is held: one read again fits as a lag."""
     times = read_times(run.recorded)
     if times == 1:
         return run

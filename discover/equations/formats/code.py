@@ -2,6 +2,8 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from importlib import import_module
 from typing import Any
 
 from discover.equations.equation import Equation
@@ -31,28 +33,27 @@ class CodeNotation(Notation):
         text, _ = printed(expression, letters, self._text)
         return f"({text})" if factor else text
 
+    printer = "numpy.NumPyPrinter"  # of `sympy.printing`
+    largest = "max({}, {})"  # of two numbers, not of arrays
+    written = (r"numpy\.", "np.")  # how the printer names a module, and how the text does
+
     def _text(self, expression: Any) -> str:
-        from sympy.printing.numpy import NumPyPrinter
+        module, _, name = self.printer.partition(".")
+        base = getattr(import_module(f"sympy.printing.{module}"), name)
+        largest = self.largest.format
 
-        class Printer(NumPyPrinter):
-            def _print_Max(self, expr: Any) -> str:  # of numbers, not of arrays
-                return f"max({', '.join(map(self._print, expr.args))})"
+        class Printer(base):
+            def _print_Max(self, expr: Any) -> str:
+                return reduce(largest, map(self._print, expr.args))
 
-        return str(Printer().doprint(expression)).replace("numpy.", "np.")
+        return re.sub(self.written[0], self.written[1], Printer().doprint(expression))
 
 
 class _SympyCodeNotation(CodeNotation):
     exponential_form = "(sympy.exp({rate} * {trace}) - 1)"
     saturating_form = "({trace} / (1 + {level} * sympy.Abs({trace})))"
-
-    def _text(self, expression: Any) -> str:
-        from sympy.printing.pycode import SymPyPrinter
-
-        class Printer(SymPyPrinter):
-            def _print_Max(self, expr: Any) -> str:
-                return f"sympy.Max({', '.join(map(self._print, expr.args))})"
-
-        return re.sub(r"sympy\.functions(\.\w+)+\.", "sympy.", str(Printer().doprint(expression)))
+    printer, largest = "pycode.SymPyPrinter", "sympy.Max({}, {})"
+    written = (r"sympy\.functions(\.\w+)+\.", "sympy.")
 
 
 # Lines of templates that begin so are for laws with a name, structure variables or states alone

@@ -122,7 +122,7 @@ class FenePeterlin(AbstractConstitutiveLaw):
 def fene_p(
     inverse: Float[Array, ""], rest: Float[Array, ""], stress: Symmetric, rate: Symmetric
 ) -> Symmetric:
-    """Return h of FENE-P with `inverse` q = 1/L² and `rest` 1 − 3q, given for it may be small."""
+    """Return h of FENE-P with `inverse` q = 1/L² and `rest` 1 − 3q, which may be small."""
     stretch = trace(stress)
     factor = 1.0 + inverse * stretch
     growth = inverse * (inner(stress, rate) - factor * stretch) / rest

@@ -64,7 +64,9 @@ class FiniteRoliePoly(AbstractConstitutiveLaw):
         released = self.constraint_release * stretch ** (2.0 * _EXPONENT)
         retracting = retraction * (conformation + released * stress / factor)
         growth = inner(conformation, rate) - trace(stress) / factor - trace(retracting)
-        stiffening = _logarithmic_slope(squared, limit) * growth / 3.0
+        # d ln k/d Λ²
+        slope = 2.0 / (limit * (3.0 - squared / limit) * (1.0 - squared / limit))
+        stiffening = slope * growth / 3.0
         return (1.0 - factor) * rate + factor * retracting - stiffening * stress
 
     def conformation(self, stress: Symmetric) -> Symmetric:
@@ -85,11 +87,6 @@ class FiniteRoliePoly(AbstractConstitutiveLaw):
 def _stiffening(squared, limit):
     share = (1.0 - 1.0 / limit) / (3.0 - 1.0 / limit)
     return share * (3.0 - squared / limit) / (1.0 - squared / limit)
-
-
-def _logarithmic_slope(squared, limit):
-    """Return d ln k/d Λ²."""
-    return 2.0 / (limit * (3.0 - squared / limit) * (1.0 - squared / limit))
 
 
 class RoliePolyBlend(AbstractConstitutiveLaw):
