@@ -3,6 +3,7 @@
 import errno
 import functools
 import io
+import math
 import os
 import signal
 import socket
@@ -88,44 +89,24 @@ def progress_bar(quiet: bool) -> Iterator[Report]:
     if quiet or not console.is_terminal:
         yield lambda label, fraction: None
         return
+    from rich import progress
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
-    from rich.text import Text
-
-    class TimeLeft(ProgressColumn):
-        """Time left, as told last, less what has passed since."""
-
-        def render(self, task):
-            """Return it in words; nothing while it is unknown."""
-            if task.fields["end"] is None:
-                return Text()
-            return Text(f"about {_duration(task.fields['end'] - (task.elapsed or 0.0))} left")
 
     columns = (
-        BarColumn(bar_width=24),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TimeLeft(),
-        TextColumn("{task.description}"),
+        progress.BarColumn(bar_width=24),
+        progress.TextColumn("{task.percentage:3.0f} %, "),
+        progress.TimeElapsedColumn(),
+        progress.TextColumn("and about"),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left: {task.description}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar, on_stop(bar.stop):
-        task = bar.add_task("starting", total=1.0, end=None)
-
-        def report(label: str, fraction: float) -> None:
-            elapsed = bar.tasks[0].elapsed or 0.0
-            # fractions are of time
-            end = elapsed / fraction if 0.02 < fraction < 1.0 else None
-            bar.update(task, completed=fraction, description=escape(label[:70]), end=end)
-
-        yield report
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 60:
-        return f"{max(seconds, 1):.0f} s"
-    if seconds < 3600:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
+    # fractions are of time: the whole course tells the time left, not its last seconds
+    bar = progress.Progress(
+        *columns, console=console, transient=True, speed_estimate_period=math.inf
+    )
+    with bar, on_stop(bar.stop):
+        task = bar.add_task("starting", total=1.0)
+        yield lambda label, f: bar.update(task, completed=f, description=escape(label[:70]))
 
 
 def interrupted() -> str:
