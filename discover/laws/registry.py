@@ -1,9 +1,7 @@
 """Named laws, as study files spell them: ``NAMED`` of the files in `textbook`, and a user's own."""
 
-import importlib
 import inspect
 import math
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -15,9 +13,9 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from discover.errors import InputError, Problems
-from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, State, as_parameter
 from discover.laws.each_mode import law_of_mode
+from discover.laws.textbook import classical, pom_pom, rolie_poly
 from discover.plain_numbers import as_number, short
 from discover.validation import require_new_name
 from discover.words import nearest, unknown_name
@@ -67,12 +65,7 @@ if TYPE_CHECKING:
 
 
 def _named_laws() -> dict[str, NamedLaw]:
-    files = [module.name for module in pkgutil.iter_modules(textbook.__path__)]
-    laws: dict[str, NamedLaw] = {}
-    # those of textbooks come first in lists, in their order
-    for file in dict.fromkeys(["classical", *files]):
-        laws |= getattr(importlib.import_module(f"{textbook.__name__}.{file}"), "NAMED", {})
-    return laws
+    return {**classical.NAMED, **pom_pom.NAMED, **rolie_poly.NAMED}
 
 
 LAWS: Registry[NamedLaw] = Registry("law", "discover.laws", _named_laws)
