@@ -1,7 +1,6 @@
 """Algebra and kinematics of symmetric tensors, (3, 3) or the four components of simple shear.
 
-Traces, squares and anticommutators keep tensors symmetric; laws written with them work on both, and
-on four components they compile to far less than matrix products.
+On four components laws compile to far less than matrix products.
 
 Examples
 --------
@@ -12,6 +11,10 @@ Examples
 (4.0, 18.0)
 >>> rate_of_deformation(jnp.asarray(2.0)).tolist()  # of simple shear
 [0.0, 0.0, 0.0, 2.0]
+>>> scalar_invariants(first, second)[:2].tolist(), integrity_basis(first, second).shape
+([2.0, 4.0], (8, 4))
+>>> upper_convected_production(second, jnp.asarray(2.0)).tolist()  # σ11 grows with 2 γ̇ σ12
+[12.0, 0.0, 0.0, 0.0]
 """
 
 import jax.numpy as jnp
@@ -75,10 +78,7 @@ def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
 
 
 def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float[Array, "..."]:
-    """Return Σᵢ first[…, i] second[i, …], as `jnp.tensordot` with `axes=1` does.
-
-    No product of matrices stands in it, which XLA would start by itself at every step of a loop.
-    """
+    """Return Σᵢ first[…, i] second[i, …] without a product of matrices, which XLA starts apart."""
     columns = (1,) * (second.ndim - 1)
     return jnp.sum(first.reshape(first.shape + columns) * second, axis=first.ndim - 1)
 
@@ -98,15 +98,10 @@ IDENTICALLY_ZERO_IN_SHEAR = (4,)
 
 
 def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
-    """Return the invariants of two symmetric tensors, (3, 3) or (4,), named in `INVARIANT_NAMES`.
+    """Return the `INVARIANT_NAMES` of two symmetric tensors, (3, 3) or (4,).
 
-    Eight of Smith's ten [Smith 1971, IJES 9, 899]: tr γ̇ vanishes at constant volume; tr σ²γ̇²
-    follows from the others in simple shear, but not in a general flow.
-
-    Examples
-    --------
-    >>> scalar_invariants(jnp.array([2.0, 0.0, 0.0, 0.0]), jnp.zeros(4))[:2].tolist()  # tr σ, tr σ²
-    [2.0, 4.0]
+    Eight of Smith's ten [Smith 1971, IJES 9, 899]: tr γ̇ vanishes at constant volume, and tr σ²γ̇²
+    follows from the others in simple shear alone.
     """
     stress_squared, rate_squared = square(stress), square(rate)
     return jnp.stack([
@@ -129,16 +124,7 @@ TENSOR_ORDERS = (0, 1, 1, 2, 2, 2, 3, 3)
 def integrity_basis(
     stress: Symmetric, rate: Symmetric
 ) -> Float[Array, "8 3 3"] | Float[Array, "8 4"]:
-    """Return I, σ, γ̇, σ², γ̇², σγ̇+γ̇σ, σ²γ̇+γ̇σ², σγ̇²+γ̇²σ [Smith 1971, IJES 9, 899].
-
-    Any isotropic symmetric function of two symmetric tensors is a sum of these with coefficients in
-    the ten invariants.
-
-    Examples
-    --------
-    >>> integrity_basis(jnp.zeros(4), jnp.zeros(4)).shape
-    (8, 4)
-    """
+    """Return the `TENSOR_NAMES`, basis of isotropic functions [Smith 1971, IJES 9, 899]."""
     stress_squared, rate_squared = square(stress), square(rate)
     return jnp.stack([
         identity_like(stress), stress, rate, stress_squared, rate_squared,
@@ -163,16 +149,7 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
 
 
 def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
-    """Return L·σ + σ·Lᵀ, what the upper-convected derivative subtracts from dσ/dt [Oldroyd 1950].
-
-    `stress`: (3, 3) with a full L, else four components with (4,) or () of L.
-
-    Examples
-    --------
-    >>> stress, rate = jnp.array([0.0, 0.0, 0.0, 3.0]), jnp.asarray(2.0)
-    >>> upper_convected_production(stress, rate).tolist()  # σ11 grows with 2 γ̇ σ12
-    [12.0, 0.0, 0.0, 0.0]
-    """
+    """Return L·σ + σ·Lᵀ [Oldroyd 1950] of (3, 3), or of four components with (4,) or () of L."""
     velocity_gradient = jnp.asarray(velocity_gradient)
     if velocity_gradient.shape == ():
         zero = jnp.zeros_like(stress[0])

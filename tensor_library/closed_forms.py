@@ -1,8 +1,4 @@
-"""Closed-form scalar multipliers of terms, and the registry of named things.
-
-Each has one inner parameter, fitted apart from the coefficients, and vanishes at zero stress. For a
-user's own see docs/adding-a-term.md.
-"""
+"""Closed-form scalar multipliers of terms, and the registry of named things."""
 
 import math
 import re
@@ -24,11 +20,7 @@ class ExtensionWarning(UserWarning):
 
 
 class Registry(MutableMapping[str, T]):
-    """Things of one kind by name, in the order in which they became known.
-
-    `kind`: the singular, for messages. `group`: entry points that bring more, such as
-    ``"discover.laws"``. `built_in`: makes those that are always there.
-    """
+    """Things of one `kind` by name: built in, registered, and of entry points of a `group`."""
 
     def __init__(self, kind: str, group: str, built_in: Callable[[], Mapping[str, T]]):
         self.kind, self.group = kind, group
@@ -113,20 +105,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """Scalar function of tr σ with one inner parameter.
+    """Scalar function of tr σ with one inner parameter, zero at zero stress.
 
     Attributes
     ----------
-    name, spelling
-        Key in a library description, and canonical text.
+    name, spelling, source
+        Key in a library description, canonical text, and literature.
     inner_name, inner_default, inner_bounds
         Inner parameter, where a fit starts, and its admissible range.
-    function
-        ``f(trace_of_stress, inner)``, dimensionless, both of shape (), in jax.numpy.
-    complexity, source
-        Number of operations, for model selection; literature.
-    expression
-        `function` of SymPy symbols; None for a built-in form.
+    function, expression
+        ``f(trace_of_stress, inner)``, dimensionless, both of shape (), in jax.numpy; and the same
+        of SymPy symbols, None for a built-in form.
+    complexity
+        Number of operations, for model selection.
 
     Examples
     --------
@@ -172,11 +163,10 @@ _SPELLING = re.compile(r"\([a-z0-9_+\-*/^().]*tr\(sigma\)[a-z0-9_+\-*/^().]*\)")
 
 
 def register_closed_form(form: ClosedForm) -> ClosedForm:
-    """Make a closed form of one's own, with its `expression`, known in this process.
+    """Make a closed form of one's own known in this process; see docs/adding-a-term.md.
 
-    An installed package does so in every process: see docs/adding-a-term.md. Raises ValueError if
-    a name or spelling is taken or none, the default is out of bounds, the form does not vanish at
-    zero stress, or `function` and `expression` differ.
+    Raises ValueError if a name or spelling is taken or none, the default is out of bounds, the form
+    does not vanish at zero stress, or `function` and `expression` differ.
 
     Examples
     --------

@@ -15,14 +15,7 @@ RESERVED = ("s", "d", "unit", "constant", "mode", "variables", "np", "sympy", "u
 
 
 def scalars(*names: str) -> Any:
-    """Return the SymPy symbols of invariants, constants and defined scalars; one alone as itself.
-
-    Examples
-    --------
-    >>> from tensor_library.isotropic_function import scalars
-    >>> scalars("tr(sigma)") / scalars("L2")
-    tr(sigma)/L2
-    """
+    """Return the SymPy symbols of invariants, constants, defined scalars; one alone as itself."""
     import sympy
 
     found = tuple(sympy.Symbol(name, real=True) for name in names)
@@ -35,8 +28,7 @@ class IsotropicFunction:
 
     `coefficients`: gₙ by tensor of `TENSOR_NAMES`, over `scalars`. `where`: scalars defined on the
     way, in order. `letters`: LaTeX of constants whose names are no letters. `rates`: of each
-    structure variable in the order of the state, over 1/λ. Raises ValueError if a tensor or name is
-    unusable.
+    structure variable, over 1/λ. Raises ValueError if a tensor or name is unusable.
 
     Examples
     --------
@@ -71,10 +63,7 @@ class IsotropicFunction:
     def spell(
         self, notation: Notation, letters: Mapping[str, Any]
     ) -> tuple[list[tuple[str, Any]], list[tuple[str, Any]], list[Any]]:
-        """Return `where` and `rates` by name, and the summands of h, in a notation.
-
-        `letters`: how constants, structure variables and defined scalars are written.
-        """
+        """Return `where` and `rates` by name, and the summands of h, with `letters` for scalars."""
         known = {**letters, **{name: notation.spelled(name) for name in INVARIANT_NAMES}}
         where, rates = (
             [(name, notation.scalar(one, known)) for name, one in each.items()]

@@ -21,12 +21,10 @@ class LawTerm:
 
     Attributes
     ----------
-    term
-        Canonical spelling.
+    term, inner
+        Canonical spelling, and inner parameters of a closed form by name; by default its own.
     coefficient, ci95
         c, dimensionless, and its 95 % interval; None where declared or not computed.
-    inner
-        Inner parameters of a closed form by name; the form's default where one is missing.
 
     Examples
     --------
@@ -68,10 +66,7 @@ class LawTerm:
 
 @dataclass(frozen=True)
 class LawTerms:
-    """Sum of terms as a library holds it: each once, one value of each inner parameter.
-
-    `coefficients`: canonical spelling → coefficient; empty for h = 0. `inner`: by name.
-    Dimensionless.
+    """Sum of terms as a library holds it: `coefficients` by spelling, one value of each `inner`.
 
     Examples
     --------
@@ -84,10 +79,7 @@ class LawTerms:
 
     @classmethod
     def of(cls, terms: Iterable[LawTerm]) -> "LawTerms":
-        """Return the sum of these terms.
-
-        Raises ValueError if a term stands there twice, or an inner parameter has two values.
-        """
+        """Add terms up; ValueError if one stands twice, or an inner parameter has two values."""
         coefficients: dict[str, float] = {}
         inner: dict[str, float] = {}
         for term in terms:

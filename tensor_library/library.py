@@ -29,8 +29,7 @@ class TermLibrary:
 
     Examples
     --------
-    >>> library = TermLibrary((parse_term("sigma"), parse_term("sigma.sigma")))
-    >>> library.names
+    >>> TermLibrary((parse_term("sigma"), parse_term("sigma.sigma"))).names
     ('sigma', 'sigma.sigma')
     """
 
@@ -88,11 +87,7 @@ class TermLibrary:
 
     @cached_property
     def _layout(self):
-        """Index arrays that turn many small products into a few gathers.
-
-        The monomials of degree d are products of one of degree d − 1 and one invariant, so one
-        gather and one product per degree serve any number of terms.
-        """
+        """Index arrays that make many small products a gather and a product a degree."""
         needed = {(0,) * N_INVARIANTS}
         for powers in (term.powers for term in self.terms):
             while powers not in needed:
@@ -119,10 +114,9 @@ class TermLibrary:
 
         Parameters
         ----------
-        stress, rate
-            Dimensionless, both of shape (3, 3) or (4,).
-        inner
-            Dimensionless, of `inner_names`, shape (m,); by default the forms' own.
+        stress, rate, inner
+            Dimensionless: both of shape (3, 3) or (4,); `inner_names`, shape (m,), by default the
+            forms'.
         """
         levels, monomial_of_term, form_of_term, tensor_of_term = self._layout
         invariants = scalar_invariants(stress, rate)
@@ -156,14 +150,12 @@ def build_library(
 
     Parameters
     ----------
-    tensors, invariants
-        From `TENSOR_NAMES` and `INVARIANT_NAMES`; by default all that can differ from 0 in shear.
-    degree
-        Highest total degree of the invariant multipliers, 0 to 4.
-    closed_forms, closed_form_tensors
-        Keys of `CLOSED_FORMS`, each multiplied with every one of these tensors.
-    extra
-        Further terms in canonical spelling. ValueError if a name is unknown, or the degree.
+    tensors, invariants, degree
+        From `TENSOR_NAMES` and `INVARIANT_NAMES`, by default all that can differ from 0 in shear;
+        highest total degree of the invariants, 0 to 4.
+    closed_forms, closed_form_tensors, extra
+        Keys of `CLOSED_FORMS`, each multiplied with every one of these tensors; further terms in
+        canonical spelling. ValueError if a name is unknown, or the degree.
 
     Examples
     --------

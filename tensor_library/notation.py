@@ -1,8 +1,4 @@
-"""What a notation has to say, so that terms can be written in it: LaTeX, Python, SymPy.
-
-`CandidateTerm.spell` decides once what a term is made of, in which order, and where a sum needs
-brackets. A notation only says how it writes a tensor, a product or a bracket.
-"""
+"""What a notation says, so that `CandidateTerm.spell` can write terms: LaTeX, Python, SymPy."""
 
 import re
 import unicodedata
@@ -11,10 +7,7 @@ from typing import Any
 
 
 class Notation:
-    """How one format writes the parts of a term: text by patterns, ``{}`` for what is written.
-
-    A notation of another kind, such as expressions, answers each question by itself.
-    """
+    """How one format writes the parts of a term: text by patterns, ``{}`` for what is written."""
 
     tensors: Mapping[str, Any]
     dot: str  # between tensors
@@ -95,11 +88,7 @@ class Notation:
 def printed(
     expression: Any, letters: Mapping[str, str], printer: Callable[[Any], str]
 ) -> tuple[str, bool]:
-    """Return an expression as a printer of SymPy writes it, with given texts for its symbols.
-
-    `expression`: over symbols. `letters`: what stands for them, by their names. `printer`: takes an
-    expression and returns text. Returns the text, and whether it needs brackets to be a factor.
-    """
+    """Return SymPy's text with `letters` for symbols, and whether it needs brackets as a factor."""
     import sympy
 
     symbols = sorted(expression.free_symbols, key=str)

@@ -29,12 +29,8 @@ class CandidateTerm:
 
     Attributes
     ----------
-    tensor
-        Index into `TENSOR_NAMES`.
-    powers
-        Exponent of each invariant of `INVARIANT_NAMES`.
-    closed_form
-        Key of `CLOSED_FORMS`, or None.
+    tensor, powers, closed_form
+        Index into `TENSOR_NAMES`, exponents of `INVARIANT_NAMES`, key of `CLOSED_FORMS` or None.
 
     Examples
     --------
@@ -107,10 +103,8 @@ class CandidateTerm:
 
         Parameters
         ----------
-        stress, rate
-            Dimensionless, both of shape (3, 3) or (4,).
-        inner
-            Dimensionless inner parameters by name, of shape (); the form's default without.
+        stress, rate, inner
+            Dimensionless: both of shape (3, 3) or (4,); inner parameters by name, of shape ().
         """
         invariants = scalar_invariants(stress, rate)
         value = integrity_basis(stress, rate)[self.tensor]
@@ -132,10 +126,9 @@ class CandidateTerm:
 
         Parameters
         ----------
-        notation
-            How to write it.
-        coefficient, inner
-            Number in front, if any; and inner parameters by name, letters where missing.
+        notation, coefficient, inner
+            How to write it; number in front, if any; inner parameters by name, letters where
+            missing.
         """
         factors = [] if coefficient is None else [notation.number(coefficient)]
         if self.form is not None:
@@ -160,9 +153,7 @@ class CandidateTerm:
 
 
 def parse_term(name: str) -> CandidateTerm:
-    """Return the term with this canonical spelling, which is matched, never evaluated.
-
-    Raises ValueError if the text is none.
+    """Return the term of a canonical spelling, matched, never evaluated; ValueError if it is none.
 
     Examples
     --------

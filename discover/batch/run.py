@@ -76,11 +76,7 @@ def _run(
     task: str, path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress,
     tolerance: float | None = None,
 ) -> TaskResult:  # fmt: skip
-    """Run a task on a study; InputError if the study, its data or the folder is wrong.
-
-    `out`: goes on there with unfinished results. `seed`, `tolerance`: in place of the study's.
-    `progress`: called with what is going on and the fraction done.
-    """
+    """Run or go on with a task on a study; InputError if the study, its data or folder is wrong."""
     enable_x64()
     enable_compilation_cache()
     study = read_study(path)
@@ -122,12 +118,7 @@ def run_batch(
     seed: int | None = None, overwrite: bool = False,
     progress: Progress = lambda label, fraction: None,
 ) -> BatchResult:  # fmt: skip
-    """Run studies into folders of their own; one that fails does not stop the others.
-
-    A study with ``[loop]`` closes the loop, one with ``[compare]`` or neither compares. With one of
-    `workers` everything happens in this process. Raises InputError if two studies would write to
-    one folder, or `out` cannot be written to.
-    """
+    """Run studies into folders of their own; one that fails does not stop the others."""
     make_folder(out)
     resumable.set()
     if not overwrite:
@@ -156,11 +147,7 @@ def run_batch(
 
 
 def folder_names(paths: Sequence[Path]) -> list[str]:
-    """Return a folder name for every study: its stem, with its folder's name where stems repeat.
-
-    Capitals make no difference; names of the batch's own files get ``study-`` before them. Raises
-    InputError if two still have one name.
-    """
+    """Return folder names of studies: stems, with folders where these repeat; or InputError."""
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     times = Counter(stem.casefold() for stem in stems)
     names = [

@@ -47,10 +47,7 @@ class BatchResult(NotebookView):
         return [study for study in self.studies if study.status == "failed"]
 
     def table(self) -> pd.DataFrame:
-        """Return how the studies ended as a table, one line each, with the verdict or the reason.
-
-        Nothing in it depends on when or how often a study was run, as `studies` does.
-        """
+        """Return how the studies ended, a line each, with verdict or reason, whenever they ran."""
         columns = ("name", "task", "outcome", "text")
         lines = [[getattr(study, name) for name in columns] for study in self.studies]
         return pd.DataFrame(lines, columns=["study", *columns[1:]])
@@ -97,10 +94,7 @@ _PAGE_PAUSE = 5.0  # seconds in which the page is written once, however many stu
 
 
 class Summary:
-    """Follows the jobs of a batch, given as name and task, and says how far it is.
-
-    Studies whose result was there already do not count as time.
-    """
+    """Follows the jobs of a batch and says how far it is; what was complete takes no time."""
 
     def __init__(
         self, out: Path, jobs: Sequence[tuple[str, str]],

@@ -3,6 +3,7 @@
 import errno
 import functools
 import io
+import math
 import os
 import signal
 import socket
@@ -43,10 +44,7 @@ class _HeardOrNot(io.FileIO):
 
 
 def heard_or_not(stream: Any) -> Any:
-    """Return a standard stream that takes any character, and lets its reader leave early.
-
-    Characters that a terminal does not know, such as σ, are spelled out.
-    """
+    """Return a standard stream that spells out unknown characters, and lets its reader leave."""
     if not isinstance(stream, io.TextIOWrapper):  # somebody's own, or none at all
         return stream
     try:
@@ -84,54 +82,31 @@ def _one_line(text: str) -> str:
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Report]:
-    """Yield a function of what is going on and the fraction done, 0 to 1.
-
-    Draws nothing when `quiet`, or when standard error is not a terminal.
-    """
+    """Yield a function of what goes on and the fraction done; silent if `quiet` or no terminal."""
     from rich.console import Console
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield lambda label, fraction: None
         return
+    from rich import progress
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
-    from rich.text import Text
-
-    class TimeLeft(ProgressColumn):
-        """Time left, as told last, less what has passed since."""
-
-        def render(self, task):
-            """Return it in words; nothing while it is unknown."""
-            if task.fields["end"] is None:
-                return Text()
-            return Text(f"about {_duration(task.fields['end'] - (task.elapsed or 0.0))} left")
 
     columns = (
-        BarColumn(bar_width=24),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TimeLeft(),
-        TextColumn("{task.description}"),
+        progress.BarColumn(bar_width=24),
+        progress.TextColumn("{task.percentage:3.0f} %, "),
+        progress.TimeElapsedColumn(),
+        progress.TextColumn("and about"),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left: {task.description}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar, on_stop(bar.stop):
-        task = bar.add_task("starting", total=1.0, end=None)
-
-        def report(label: str, fraction: float) -> None:
-            elapsed = bar.tasks[0].elapsed or 0.0
-            # fractions are of time
-            end = elapsed / fraction if 0.02 < fraction < 1.0 else None
-            bar.update(task, completed=fraction, description=escape(label[:70]), end=end)
-
-        yield report
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 60:
-        return f"{max(seconds, 1):.0f} s"
-    if seconds < 3600:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
+    # fractions are of time: the whole course tells the time left, not its last seconds
+    bar = progress.Progress(
+        *columns, console=console, transient=True, speed_estimate_period=math.inf
+    )
+    with bar, on_stop(bar.stop):
+        task = bar.add_task("starting", total=1.0)
+        yield lambda label, f: bar.update(task, completed=f, description=escape(label[:70]))
 
 
 def interrupted() -> str:
@@ -150,9 +125,8 @@ _PATIENCE = 4.0  # seconds for last words
 def obeying_interrupts() -> Iterator[None]:
     """End the process within about a second of Ctrl-C, with one line and `INTERRUPTED_CODE`.
 
-    Python alone raises an exception between two instructions of the main thread: never while a
-    program is compiled, and it is lost in a library's callback. So a thread listens and ends the
-    process. Does nothing outside the main thread, or where somebody handles the signal already.
+    Python raises between two instructions of the main thread alone: never while a program compiles.
+    So a thread listens. Nothing outside the main thread, or where the signal is handled already.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -256,13 +230,13 @@ def number(text: str, where: str) -> float:
     return float(text)
 
 
-Texts = list[str] | None
-"""An option that may be given several times."""
+Text, Texts, Number, Place = str | None, list[str] | None, float | None, Path | None
+"""Options that may be left out; of several texts, one that may be given several times."""
 StudyArgument = Annotated[
     Path, Argument(help="Study file (TOML); discover data import writes one.", show_default=False)
 ]
 OutOption = Annotated[
-    Path | None, Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
+    Place, Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]
 SeedOption = Annotated[
     int | None,
@@ -272,6 +246,5 @@ QuietOption = Annotated[bool, Option("--quiet", "-q", help="Print no progress an
 JsonOption = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 OverwriteOption = Annotated[bool, Option("--overwrite", help="Start again instead of resuming.")]
 ToleranceOption = Annotated[
-    float | None,
-    Option(help="Relative misfit that you accept; default: the study's, or 0.05."),
+    Number, Option(help="Relative misfit that you accept; default: the study's, or 0.05.")
 ]

@@ -8,7 +8,16 @@ from typing import Annotated, get_args
 import typer
 from typer import Argument, Option
 
-from discover.cli.console import JsonOption, OverwriteOption, Texts, guarded, say
+from discover.cli.console import (
+    JsonOption,
+    Number,
+    OverwriteOption,
+    Place,
+    Text,
+    Texts,
+    guarded,
+    say,
+)
 from discover.errors import InputError
 
 data_app = typer.Typer(help="Import, check and draw data.", no_args_is_help=True)
@@ -56,14 +65,13 @@ def list_data(as_json: JsonOption = False) -> None:
 def show(
     name: FolderArgument,
     out: Annotated[
-        Path | None,
-        Option(
-            "--out", "-o", help="Folder for a page with all tests drawn, and a study to start from."
-        ),
+        Place, Option("--out", "-o", help="Folder for a page with all tests drawn, and a study.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show the runs of a data set, in a table and on a page."""
+    import pandas as pd
+
     from discover.cli.import_options import write_page
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.load import load_dataset
@@ -88,16 +96,12 @@ def show(
         return
     linear = f"a linear sweep with {n_sweep} points" if n_sweep else "no linear sweep"
     say(f"{dataset.name}: {counted(len(rows), 'run')}, {linear}")
-    typer.echo(
-        f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  flow"
-    )
     for row in (*rows, *tables):
-        words = ", ".join([row["flow"], *(key for key in ("N1", "N2") if row[key])])
-        duration = "–" if row["duration_s"] is None else f"{row['duration_s']:.4g}"
-        say(
-            f"{row['run']:<32}{row['samples']:>8}{duration:>12}"
-            f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {words}"
-        )
+        row["flow"] = ", ".join([row["flow"], *(key for key in ("N1", "N2") if row[key])])
+    columns = ["run", "samples", "duration_s", "largest_rate_1_s", "largest_stress_Pa", "flow"]
+    table = pd.DataFrame([*rows, *tables], columns=columns)
+    if len(table):
+        say(table.to_string(index=False, na_rep="–", float_format="{:.4g}".format))
     if page is None:
         say("For a page with all tests drawn, and a study to start from, add --out DIR.")
     else:
@@ -111,9 +115,7 @@ def show(
 @guarded
 def check(
     folder: FolderArgument,
-    clock_factor: Annotated[
-        str | None, Option(help="Column of runs.csv with a clock factor, to check as well.")
-    ] = None,
+    clock_factor: Annotated[Text, Option(help="Column of runs.csv with a clock factor.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """List everything that is wrong or doubtful in a data folder; exit code 2 on errors."""
@@ -137,6 +139,13 @@ def check(
         raise typer.Exit(2)
 
 
+_GEOMETRY = "For torque, angle and force: cone_plate:radius_mm=25,angle_deg=1 or "
+_GEOMETRY += "plate_plate:radius_mm=25,gap_mm=1."
+_TEST = "Kind of test in a block, if it is misread: melt.txt:2=creep; frequency_sweep, "
+_TEST += "amplitude_sweep, flow_curve, relaxation, creep, run or none."
+_TEMPERATURE = "Temperature to import, in °C, if there are several, or of a file: melt.txt=140."
+
+
 @data_app.command("import")
 @guarded
 def import_data(
@@ -144,48 +153,21 @@ def import_data(
         list[Path] | None,
         Argument(help="Exported files, with one or more tests in each, or a folder of them."),
     ] = None,
-    out: Annotated[Path | None, Option("--out", "-o", help="Data folder to make.")] = None,
-    mapping: Annotated[Path | None, Option(help="TOML file with the options below.")] = None,
+    out: Annotated[Place, Option("--out", "-o", help="Data folder to make.")] = None,
+    mapping: Annotated[Place, Option(help="TOML file with the options below.")] = None,
     column: Annotated[Texts, Option(help="Which column is what: stress='Stress'.")] = None,
     unit: Annotated[Texts, Option(help="Unit of a quantity: stress=kPa.")] = None,
-    geometry: Annotated[
-        str | None,
-        Option(
-            help="For torque, angle and force: cone_plate:radius_mm=25,angle_deg=1 or "
-            "plate_plate:radius_mm=25,gap_mm=1."
-        ),
-    ] = None,
-    block: Annotated[
-        list[int] | None, Option(min=1, help="Import only these blocks of a file.")
-    ] = None,
-    test: Annotated[
-        Texts,
-        Option(
-            help="Kind of test in a block, if it is misread: melt.txt:2=creep; "
-            "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none."
-        ),
-    ] = None,
-    temperature: Annotated[
-        Texts,
-        Option(
-            help="Temperature to import, in °C, if there are several, or that of a file: "
-            "melt.txt=140."
-        ),
-    ] = None,
-    start_time: Annotated[
-        float | None, Option(help="Clock reading when the flow started, in s.")
-    ] = None,
-    form: Annotated[
-        str | None,
-        Option("--format", help="Importer of your own; default: by suffix, else text."),
-    ] = None,
-    delimiter: Annotated[str | None, Option(help="tab, semicolon or comma.")] = None,
-    decimal: Annotated[str | None, Option(help="Decimal sign, . or ,")] = None,
+    geometry: Annotated[Text, Option(help=_GEOMETRY)] = None,
+    block: Annotated[list[int] | None, Option(min=1, help="Import only these blocks.")] = None,
+    test: Annotated[Texts, Option(help=_TEST)] = None,
+    temperature: Annotated[Texts, Option(help=_TEMPERATURE)] = None,
+    start_time: Annotated[Number, Option(help="Clock when the flow started, in s.")] = None,
+    form: Annotated[Text, Option("--format", help="Importer; default: by suffix or text.")] = None,
+    delimiter: Annotated[Text, Option(help="tab, semicolon or comma.")] = None,
+    decimal: Annotated[Text, Option(help="Decimal sign, . or ,")] = None,
     header_row: Annotated[int | None, Option(min=1, help="Line with the column names.")] = None,
-    encoding: Annotated[str | None, Option(help="Such as cp1252.")] = None,
-    page: Annotated[
-        bool, Option(help="Write a page with every test drawn, and a study to start from.")
-    ] = True,
+    encoding: Annotated[Text, Option(help="Such as cp1252.")] = None,
+    page: Annotated[bool, Option(help="Write a page with every test drawn, and a study.")] = True,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:

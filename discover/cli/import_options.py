@@ -31,10 +31,9 @@ def merge_mapping(
     layout: AnyMapping[str, object], geometry: str | None = None,
     blocks: Sequence[int] | None = None, start_time_s: float | None = None,
 ) -> Mapping:  # fmt: skip
-    """Return the mapping of a file with the options of the command line on top.
+    """Return the mapping of a file with the options of the command line on top, as typed.
 
-    `given`: as ``stress=Shear stress``, ``creep``, ``melt.txt:2=creep``, ``40``, ``melt.txt=313K``.
-    `geometry`: as ``cone_plate:radius_mm=25,angle_deg=1``. Raises InputError if one is wrong.
+    `given`: ``stress=Shear stress``, ``melt.txt:2=creep``, ``40``. InputError if one is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):
@@ -82,10 +81,7 @@ def _degrees(text: str) -> float:
 def sources_of(
     mapping: Mapping, path: Path | None, files: Sequence[Path]
 ) -> tuple[list[Path], list[str]]:
-    """Return the files to import, or else those of the mapping file, and which have changed.
-
-    A folder stands for the files in it.
-    """
+    """Files to import, those of folders too, or of the mapping file, and which changed."""
     if files or path is None:
         each = (sorted(one.glob("[!.]*.*")) if one.is_dir() else [one] for one in files)
         return [one for own in each for one in own], []
@@ -103,10 +99,7 @@ def sources_of(
 def write_folder(
     imported: ImportedFolder, out: Path, overwrite: bool, mapping_file: Path | None = None
 ) -> None:
-    """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
-
-    Raises InputError if it holds data already, or a table would replace a file that was read.
-    """
+    """Write a data folder, ``runs.csv`` last; InputError if it holds data, or a file read."""
     for name in (*imported.files, *([] if mapping_file else [MAPPING_FILE])):
         read = [source.file for source in imported.mapping.source if _same(out / name, source.file)]
         if read:
@@ -149,10 +142,7 @@ def write_page(
     dataset: "Dataset", folder: str, out: Path, findings: Sequence["Finding"],
     said: Sequence[str] = (),
 ) -> tuple[Path, list[str]]:  # fmt: skip
-    """Write a page on a data folder, and a first study unless there is one.
-
-    `folder`: as the study names it. Returns the page's path, and what was kept, in words.
-    """
+    """Write a page on a data `folder`, and a first study if there is none; also what is kept."""
     from discover.report.data import data_page, first_study
 
     make_folder(out)

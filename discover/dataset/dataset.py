@@ -22,20 +22,17 @@ from discover.words import counted, unknown_name
 class Dataset(NotebookView):
     """Runs on one fluid: a sequence of runs, for Python and for scikit-learn.
 
-    ``data["a.csv"]`` and ``data[0]`` are a run; ``data[:3]``, ``data[[0, 2]]`` and
-    ``data[["a.csv", "b.csv"]]`` are data sets, and so is what a boolean array chooses.
+    ``data["a.csv"]`` and ``data[0]`` are a run; ``data[:3]``, ``data[[0, 2]]`` and ``data[["a.csv",
+    "b.csv"]]`` are data sets, and so is what a boolean array chooses.
 
     Attributes
     ----------
     name, provenance
         Of the folder, or of the synthetic study; where the data come from, in words.
-    runs, linear_sweep
-        The runs; small-amplitude data on the same fluid, where there are any.
+    runs, linear_sweep, material_functions
+        The runs, small-amplitude data, and tables next to the runs, as runs, by kind.
     set_aside
         Runs of the folder that cannot be fitted, by name, with the reason.
-    material_functions
-        Tables next to the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``,
-        ``amplitude_sweep``.
 
     Examples
     --------
@@ -181,9 +178,8 @@ class Dataset(NotebookView):
     def with_material_functions(self, kinds: Sequence[str] | None = None) -> "Dataset":
         """Return the data with its tables as runs; InputError if there is no such table.
 
-        `kinds`: of `material_functions`, or ``lve`` for the linear sweep; by default all tables,
-        and the linear sweep only where there is nothing else. G′ and G″ of a sweep become a run
-        each, such as ``"amplitude_sweep.csv (loss_modulus)"``.
+        `kinds`: of `material_functions`, or ``lve``; by default all tables, and ``lve`` only where
+        there is nothing else. G′ and G″ of a sweep become a run each.
         """
         there = dict(self.material_functions)
         if self.linear_sweep is not None:
@@ -203,11 +199,7 @@ class Dataset(NotebookView):
         return replace(self, runs=(*self.runs, *added), material_functions=left)
 
     def quantity_by_quantity(self) -> "Dataset":
-        """Return the data with N1 and N2, where recorded, as runs of their own: ``"a.csv (N1)"``.
-
-        Samples that no fluid can have are left out; a run of nothing else is set aside. Records
-        that are runs of their own already stay as they are.
-        """
+        """Return the data with N1 and N2 as runs of their own, without impossible samples."""
         late, never = sound_normal_stress(self.runs, self.linear_sweep)
         aside = {f"{name} (N1)": why for name, why in never.items()}
         seen: list[Run] = []
@@ -220,10 +212,7 @@ class Dataset(NotebookView):
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None
     ) -> "tuple[Dataset, Dataset]":
-        """Return the runs to fit, by default all others, and the held-out runs, as two data sets.
-
-        Raises InputError if a run does not exist or is in both, or one would be empty.
-        """
+        """Return the runs to fit, by default all others, and those held out; else InputError."""
         for label, names in (("held_out", held_out), ("fit", fit)):
             if isinstance(names, str):
                 raise InputError(

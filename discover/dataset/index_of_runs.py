@@ -81,11 +81,7 @@ def _cells(index: Table, key: str, column: str) -> Sequence[str]:
 
 
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
-    """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
-
-    Without a name, a column that begins with ``rate_before`` holds the rates of runs declared to
-    start from a steady flow. Raises InputError as `rates_in`.
-    """
+    """Return the rate of the steady flow before each run, in 1/s; None where nothing says it."""
     steady = starts_steady(index)
     if column is not None:
         return rates_in(index, column)
@@ -110,10 +106,7 @@ def column_of_rates_before(index: Table) -> str | None:
 
 
 def rates_in(index: Table, column: str) -> Float[np.ndarray, " runs"]:
-    """Return the rates in 1/s in a column of rates before; an empty cell is 0, a start from rest.
-
-    Raises InputError if it is missing, in the unit of another quantity, or holds no number.
-    """
+    """Rates before runs in 1/s, 0 (rest) where a cell is empty; InputError if they are none."""
     return _numbers_before(index, column) * units.heading_factor(column, units.SHEAR_RATE)
 
 

@@ -89,8 +89,7 @@ class LinearSweep:
 class RelaxationSpectrum:
     """Discrete relaxation spectrum, G(t) = Σ G_k exp(−t/λ_k), with a solvent.
 
-    An elastic constant is the last and slowest mode, whose time is the shortest that the sweep
-    cannot tell from a constant.
+    An elastic constant is the last mode, of the shortest time indistinguishable from a constant.
     """
 
     modulus: Float[np.ndarray, " k"]  # G_k in Pa, positive
@@ -138,14 +137,12 @@ def relaxation_spectrum(
 ) -> RelaxationSpectrum:  # fmt: skip
     """Return the modes, the solvent viscosity and the elastic constant that a sweep supports.
 
-    G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k, all constants
-    positive and times up to a decade beyond the sweep, are fitted to the relative misfit. Evidence
-    decides on the number of modes, solvent and elastic constant (`ModeSearch`).
+    G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k are fitted to the
+    relative misfit; evidence decides on modes, solvent and constant (`ModeSearch`).
 
-    `modes`: their number, that of an elastic constant included, where evidence is not to choose it.
-    `solvent_viscosity`, `elastic_modulus`: in Pa s and Pa where known beforehand; ``"fit"``
-    includes it without asking for evidence. Raises InputError if the sweep is too short or an
-    argument is out of range.
+    `modes`: their number, that of an elastic constant included. `solvent_viscosity`,
+    `elastic_modulus`: in Pa s and Pa where known; ``"fit"`` asks for no evidence. Raises InputError
+    if the sweep is too short or an argument is out of range.
     """
     count, measured, needs = len(sweep), sweep.measured, "A relaxation spectrum needs"
     if count < 2:
@@ -195,10 +192,7 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
 def _covariance(
     sweep: LinearSweep, found: RelaxationSpectrum, rows: Float[np.ndarray, "2 n"]
 ) -> Float[np.ndarray, "c c"]:
-    """Return s² (AᵀA)⁻¹ of moduli and solvent at given times, s² the misfit per degree of freedom.
-
-    Where the misfit is no noise, neighbouring frequencies count as its autocorrelation says.
-    """
+    """Return s² (AᵀA)⁻¹ of moduli and solvent; correlated misfit counts as fewer samples."""
     has_solvent = found.solvent_viscosity > 0.0
     amounts = np.append(found.modulus, [found.solvent_viscosity] if has_solvent else [])
     design = amounts * relative_moduli(

@@ -25,9 +25,9 @@ RELAXATION_MODULUS = units.Quantity("relaxation_modulus", "relaxation_modulus_Pa
 def read_material_functions(
     root: Path, runs: Sequence[str], frequency: float | None = None
 ) -> tuple[dict[str, Run], dict[str, str]]:
-    """Return the tables of a data folder as runs, by kind, and why others cannot be used, by file.
+    """Tables of a data folder as runs, by kind, and why others cannot be used, by file.
 
-    What ``runs.csv`` names is a run. `frequency` in rad/s, of a sweep that does not give its own.
+    `runs`: named in ``runs.csv``. `frequency` in rad/s, of a sweep that does not give its own.
     """
     found, aside = {}, {}
     for kind, read in _READERS.items():

@@ -56,11 +56,9 @@ def relative_moduli(
 
 @dataclass(frozen=True)
 class ModeSearch:
-    """Search for modes with free relaxation times in one sweep.
+    """Search for modes: those of non-negative least squares on a grid, fitted, merged and left out.
 
-    Non-negative least squares on a fine grid of times finds the most modes that the sweep supports
-    [Lawson & Hanson 1974]. Their times are then fitted jointly, and modes merged or left out one by
-    one, the least missed first; solvent and elastic constant with and without.
+    [Lawson & Hanson 1974]
     """
 
     frequency: Float[np.ndarray, " n"]  # in rad/s
@@ -193,8 +191,7 @@ class ModeSearch:
     def criterion(self, fit: ModeFit) -> float:
         """Return twice the negative log evidence   [Schwarz 1978, Ann. Stat. 6, 461].
 
-        Solvent and elastic constant have an even prior from zero to the most that the sweep leaves
-        room for, the smallest G″/ω and G′. So a fluid is no solid by one low G′.
+        Solvent and constant have an even prior from 0 to the smallest G″/ω and G′.
         """
         count = self.measured.size
         variance = self._variance(fit)

@@ -47,8 +47,8 @@ COLUMN_OF = {
 class Run(NotebookView):
     """One experiment in shear or in extension.
 
-    In extension rate and strain are Hencky's, and the stress is the tensile stress σ11 − σ22;
-    biaxial rate and stress are those of one of the two equal directions.
+    In extension rate and strain are Hencky's, and the stress is σ11 − σ22; biaxial ones are of one
+    of the two equal directions.
 
     Attributes
     ----------
@@ -60,20 +60,15 @@ class Run(NotebookView):
         The rate as a function of time, which flow has it, and what came before t = 0.
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
-    strain
-        Shape (n,), where recorded. Of oscillations by their first harmonic the amplitude, as are
-        rate and stress.
-    storage_modulus, loss_modulus
-        G′ and G″ in Pa of such oscillations, shape (n,).
+    strain, storage_modulus, loss_modulus
+        Shape (n,), where recorded. Of oscillations strain, rate and stress are amplitudes of the
+        first harmonic, beside G′ and G″ in Pa.
     rate_steps
         Steps of the rate between two samples whose instants are fitted, or were.
-    clock_factor
-        Time on the instrument's clock is ``time / clock_factor``: not one for shifted data.
-    rate_is_measured
-        Whether the rate was measured, or derived from strain, and not commanded.
+    clock_factor, rate_is_measured
+        Instrument time is ``time / clock_factor``; whether the rate was measured, not commanded.
     rate_before, strain_before
-        Rate in 1/s of the steady flow before t = 0, or zero; strain, added up without its sign,
-        that the sample had seen in earlier runs.
+        Rate in 1/s of the steady flow before t = 0; strain, without its sign, of earlier runs.
 
     Examples
     --------
@@ -270,10 +265,7 @@ class Run(NotebookView):
         return not self.from_rest or bool(np.max(np.abs(self.rate)) > SLOWEST_RATE)
 
     def window(self, keep: np.ndarray) -> "Run":
-        """Return the run with only the samples where the boolean array `keep` holds.
-
-        The flow's history is unchanged: it is the protocol's, from t = 0.
-        """
+        """Keep samples where `keep` holds; the flow's history is the protocol's, from t = 0."""
         recorded = {name: getattr(self, name) for name in _COLUMNS}
         kept = {name: values[keep] for name, values in recorded.items() if values is not None}
         return replace(self, **kept)

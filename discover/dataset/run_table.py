@@ -104,10 +104,7 @@ _MATERIAL = ("material", "sample", "sample_label")
 
 
 def temperature_of(runs: Iterable[Run]) -> float | None:
-    """Return the temperature of runs in °C, rounded; None where they have several, or are shifted.
-
-    Shifted runs are at a reference temperature, which only the study knows.
-    """
+    """Temperature of runs in °C, rounded; None where they have several, or are shifted."""
     found = set()
     for run in runs:
         if run.temperature_C is None or run.clock_factor != 1.0:
@@ -117,10 +114,7 @@ def temperature_of(runs: Iterable[Run]) -> float | None:
 
 
 def material_and_temperature(runs: Iterable[Run], material: str = "", otherwise: str = "") -> str:
-    """Material (a study's, or of runs.csv) and temperature of runs in words, if told.
-
-    `otherwise`: what stands for the material where nobody told one or two.
-    """
+    """Material (a study's, of runs.csv, or `otherwise`) and temperature of runs in words."""
     names, temperatures = [], set()
     for run in runs:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]

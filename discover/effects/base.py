@@ -17,9 +17,8 @@ from tensor_library.law_terms import LawTerm
 class WrittenState:
     """State as SymPy expressions over `tensor_library.isotropic_function.scalars`.
 
-    The scalars are named as the effect's parameters and levels, ``shear_rate`` (√(½ γ̇:γ̇), in 1/s)
-    and ``shear_stress`` (in Pa, of a shear of that rate that does the same work). `modulus_factor`,
-    `time_factor`: on stress and relaxation time of every mode.
+    The scalars are the effect's parameters and levels, ``shear_rate`` (√(½ γ̇:γ̇), in 1/s) and
+    ``shear_stress`` (in Pa, of a shear of that rate that does the same work).
     """
 
     rates: tuple[Any, ...]  # of change of each level, in 1/s, in their order
@@ -28,6 +27,8 @@ class WrittenState:
 
 
 Kind = Literal["constitutive", "kinematic", "signal"]
+Constants, Rates = Float[Array, " p"], Float[Array, " n"]
+Number, Levels = Float[Array, ""], Float[Array, "*levels"]
 
 Scale = Literal[
     "one", "sampling_time", "run_time", "inverse_rate", "strain", "stress", "inverse_stress",
@@ -46,11 +47,10 @@ class EffectParameter:
     """Parameter of an effect with its physical range; a fit that ends at the range is no finding.
 
     `low`, `high`: in `unit`, or in the data property `range_scale`. `range_source`: literature or
-    argument. `first_trial`: first trial value in `scale`; of an inner parameter its starting value.
-    `sound`: of an amplitude that is known where the effect is there, its value and the standard
-    deviation of that in a sound instrument. `endless`: of a time, what the
-    effect equals where no record lasts as long. `absent`: what the effect is with this constant at
-    `low`. `meaning`: in a few words; of a share, of what it is one. Empty: the name says it.
+    argument. `first_trial`: in `scale`; of an inner parameter its start. `sound`: value of an
+    amplitude known in a sound instrument, and its deviation. `endless`, `absent`: what the effect
+    is with this constant beyond all records, or at `low`. `meaning`: in words, where the name is
+    none.
     """
 
     name: str  # name in JSON and reports
@@ -72,8 +72,7 @@ class EffectParameter:
 class AbstractEffect(ABC):
     """Effect. Its first parameter is the amplitude: at zero it changes nothing.
 
-    `visible`: amplitude that changes the stress by about 5 %, in words. `complexity`: prefers the
-    simpler of two explanations that the data cannot separate.
+    `visible`: amplitude worth some 5 % of stress. `complexity`: prefers the simpler explanation.
     """
 
     name: str  # name in studies, JSON and reports
@@ -104,9 +103,8 @@ class AbstractEffect(ABC):
 class ConstitutiveEffect(AbstractEffect):
     """Effect on the fluid: an extra term in the law of every mode, or a stress beside the modes.
 
-    `explicit_rate`: whether the term names the rate of deformation; such laws can lose their
-    well-posedness in fast deformation [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58,
-    25].
+    `explicit_rate`: the term names the rate, and may be ill-posed in fast flow [Leonov 1992, JNNFM
+    42].
     """
 
     explicit_rate: bool = False
@@ -119,12 +117,8 @@ class ConstitutiveEffect(AbstractEffect):
         """Whether there is an `extra_term`."""
         return type(self).extra_term is not ConstitutiveEffect.extra_term
 
-    def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):
-        """Return what is added to h of one mode, dimensionless.
-
-        `values`: parameters in their order. `stress`, `rate`: σ_k/G_k and λ_k γ̇, both (3, 3) or
-        (4,).
-        """
+    def extra_term(self, values: Constants, stress: Symmetric, rate: Symmetric):
+        """Summand of h of one mode, dimensionless, from σ_k/G_k and λ_k γ̇, (3, 3) or (4,)."""
         del values, rate
         return jnp.zeros_like(stress)
 
@@ -133,9 +127,7 @@ class ConstitutiveEffect(AbstractEffect):
         del values
         return None if self.adds_term else ()
 
-    def instantaneous_stress(
-        self, values: Float[Array, " p"], shear_rate: Float[Array, " n"]
-    ) -> Float[Array, " n"]:
+    def instantaneous_stress(self, values: Constants, shear_rate: Rates) -> Rates:
         """Return the shear stress in Pa that the effect adds beside the modes."""
         del values
         return jnp.zeros_like(shear_rate)
@@ -145,15 +137,14 @@ class ModeEffect(ConstitutiveEffect):
     """Relaxation mode beside the declared ones, under the same law."""
 
     @abstractmethod
-    def mode(self, values: Float[Array, " p"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    def mode(self, values: Constants) -> tuple[Number, Number]:
         """Return its modulus in Pa and its relaxation time in s."""
 
 
 class StateEffect(ConstitutiveEffect):
     """State of the fluid, integrated with the modes, that scales their stress or times.
 
-    From `rest` it obeys ds/dt = source − decay · s. With several `levels` state, source and decay
-    have the shape (levels,).
+    From `rest`, ds/dt = source − decay · s; of several `levels` each of shape (levels,).
     """
 
     rest: ClassVar[float] = 0.0
@@ -166,8 +157,8 @@ class StateEffect(ConstitutiveEffect):
 
     @abstractmethod
     def source_and_decay(
-        self, values: Float[Array, " p"], shear_rate: Float[Array, ""], stress: Float[Array, ""]
-    ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
+        self, values: Constants, shear_rate: Number, stress: Number
+    ) -> tuple[Levels, Levels]:
         """Return source and decay in 1/s, from `shear_rate` in 1/s and `stress` in Pa."""
 
     @property
@@ -181,16 +172,12 @@ class StateEffect(ConstitutiveEffect):
         """Return the state as expressions, for exports; None where nobody said."""
         return None
 
-    def modulus_factor(
-        self, values: Float[Array, " p"], state: Float[Array, "*levels"]
-    ) -> Float[Array, ""]:
+    def modulus_factor(self, values: Constants, state: Levels) -> Number:
         """Return the factor on the stress of all modes."""
         del values, state
         return jnp.ones(())
 
-    def time_factor(
-        self, values: Float[Array, " p"], state: Float[Array, "*levels"]
-    ) -> Float[Array, ""]:
+    def time_factor(self, values: Constants, state: Levels) -> Number:
         """Return the factor on all relaxation times."""
         del values, state
         return jnp.ones(())
@@ -205,9 +192,8 @@ Values = Float[Array | np.ndarray, "p ..."]
 class Record:
     """Signal of one run on increasing times in s, from 0 or from a steady flow before it.
 
-    `strain_before`: strain of earlier runs, added up without regard to sign. `tool_rate`: of the
-    driven tool, as a nominal shear rate in 1/s; differs from `rate` by slip, compliance or a wrong
-    gap.
+    `strain_before`: of earlier runs, added up without sign. `tool_rate`: of the driven tool, a
+    nominal shear rate in 1/s.
     """
 
     times: Signal
@@ -228,10 +214,7 @@ class Record:
 
     @property
     def total_strain(self) -> Signal:
-        """Strain of the sample since its first run, without regard to sign, at each time.
-
-        A steady flow before t = 0 does not count.
-        """
+        """Strain since the first run, without sign; a steady flow before t = 0 does not count."""
         of: Any = self.rate.__array_namespace__()
         size = of.abs(self.rate)
         # a flow before t = 0 lasts as long as the simulation needs, not as it did in the experiment
@@ -245,9 +228,7 @@ class Record:
 class KinematicEffect(AbstractEffect):
     """Effect on the deformation that the fluid felt.
 
-    `shapes_command`: whether it acts between command and tool. A rate measured at the tool contains
-    it already, so it is then no candidate; the tool's own rate, which inertia and friction follow,
-    is the command with these effects alone.
+    `shapes_command`: it acts between command and tool, so that a measured rate contains it.
     """
 
     shapes_command: bool = False
@@ -256,8 +237,7 @@ class KinematicEffect(AbstractEffect):
     def felt_rate(self, values: Values, instrument_times: Signal, shear_rate: Signal) -> Signal:
         """Return the shear rate felt in 1/s from the one without this effect, linear between times.
 
-        `instrument_times` in s on the instrument's clock, from the start of the flow; at rest
-        before.
+        `instrument_times` in s on the instrument's clock, from the start of the flow.
         """
         del values, instrument_times
         return shear_rate
@@ -267,9 +247,8 @@ class KinematicEffect(AbstractEffect):
 class RadialAverage(KinematicEffect):
     """Torque of flows at several radii, of which the fluid at each feels its own share of the rate.
 
-    With amplitude p the shear stress is 1 − p times that at the rim and p times a weighted sum.
-    `radii`: over that of the rim, where it is one. `of_stress`, `of_modulus`: weights of stresses
-    and of moduli there; those of stresses add up to one, so that the signal's own zero stays.
+    With amplitude p the shear stress is 1 − p times the rim's and p times a weighted sum. `radii`:
+    over the rim's. `of_stress`, `of_modulus`: weights there; those of stresses add up to one.
     """
 
     radii: tuple[float, ...] = ()
@@ -279,15 +258,10 @@ class RadialAverage(KinematicEffect):
 
 
 class SeriesElement(KinematicEffect):
-    """Element in series with the fluid, which feels its stress: γ̇_felt = γ̇ − s σ − C dσ/dt.
-
-    The integrator solves this with the stress.
-    """
+    """Element in series with the fluid, solved with the stress: γ̇_felt = γ̇ − s σ − C dσ/dt."""
 
     @abstractmethod
-    def slip_and_compliance(
-        self, values: Float[Array, " p"]
-    ) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    def slip_and_compliance(self, values: Constants) -> tuple[Number, Number]:
         """Return s in 1/(Pa s) and C in 1/Pa."""
 
     @property
@@ -295,18 +269,17 @@ class SeriesElement(KinematicEffect):
         """Whether there is a `slip_at`."""
         return type(self).slip_at is not SeriesElement.slip_at
 
-    def slip_at(self, values: Float[Array, " p"], stress: Float[Array, ""]) -> Float[Array, ""]:
+    def slip_at(self, values: Constants, stress: Number) -> Number:
         """Return what the slip s in 1/(Pa s) is beyond its constant, at a stress in Pa."""
         del stress
         return jnp.zeros_like(values[0])
 
 
 class SignalEffect(AbstractEffect):
-    """Changes what was recorded of the stress.
+    """Changes what was recorded of the stress, or `of_force` of a normal or tensile stress.
 
-    `of_force`: whether of a normal or tensile stress, which a force tells, and else of a torque.
-    `is_zero`: whether it is what is read without a stress, which stood so before the record began:
-    it is added last, for a lag or a delay would make it begin with the record.
+    `is_zero`: what is read without a stress; added last, as a lag would make it begin with the
+    record.
     """
 
     kind: ClassVar[Kind] = "signal"
@@ -317,9 +290,7 @@ class SignalEffect(AbstractEffect):
     def recorded_stress(self, values: Values, record: Record) -> Signal:
         """Return the stress recorded, from the one that would be recorded without this effect."""
 
-    def response(
-        self, values: Float[Array, " p"], frequency: Float[Array, ""]
-    ) -> Complex[Array, ""] | Float[Array, ""]:
+    def response(self, values: Constants, frequency: Number) -> Complex[Array, ""] | Number:
         """Return the factor on the stress of a periodic oscillation at `frequency` in rad/s."""
         del frequency
         return jnp.ones_like(values[0])

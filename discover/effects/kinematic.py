@@ -20,10 +20,7 @@ from discover.effects.base import (
 
 
 def first_order_lag(times: Signal, values: Signal, time_constant: OfRun) -> Signal:
-    """Return y with τ y' + y = x, from y = 0; exact for x linear between times.
-
-    `times`, `time_constant` (τ) in s. At τ = 0, y = x, also at the first time.
-    """
+    """Return y of τ y' + y = x from y = 0, exact for x linear between times in s; x at τ = 0."""
     if isinstance(values, np.ndarray):
         each = np.broadcast_arrays(times, values, time_constant)
         found, own, lag = (of.reshape(-1, of.shape[-1]) for of in (each[1].copy(), *each[::2]))
@@ -101,10 +98,9 @@ RATE_GAIN = RateGain(
 
 
 def _torque_between_plates(interior: int = 3) -> tuple[tuple[float, ...], ...]:
-    """Return radii, and weights of stress and of moduli, for 4 ∫ x² σ(x γ̇) dx.
+    """Radii, and weights of stress and of moduli, for 4 ∫ x² σ(x γ̇) dx: Gauss–Radau for σ/x.
 
-    Gauss–Radau for σ/x, with the rim as a node. Stress vanishes on the axis, the zero of a
-    transducer does not: it gets what is missing to one.
+    Stress vanishes on the axis, the zero of a transducer does not: it gets what is missing to one.
     """
     # of the interior nodes Gauss's rule has the weight (1 − x) x³
     radii, weights = roots_sh_jacobi(interior, 5, 4)

@@ -9,6 +9,10 @@ from tensor_library import CandidateTerm, LawTerm, build_library
 _NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")
 
 _SIMPLEST = 16
+_ORDER_ONE = (
+    "with stresses over the modulus and rates times the relaxation time, the coefficients of known "
+    "laws are of order one (Bird, Armstrong & Hassager 1987, ch. 7); ten times leaves room"
+)
 
 
 @dataclass(frozen=True)
@@ -31,34 +35,16 @@ class LibraryTerm(ConstitutiveEffect):
 
 def library_term(term: CandidateTerm) -> LibraryTerm:
     """Return the effect that adds this term with a free coefficient, and inner parameter."""
-    form, inner = term.form, ()
+    form = term.form
+    free = [
+        EffectParameter("coefficient", "c", "", -10.0, 10.0, "one", 0.01, range_source=_ORDER_ONE)
+    ]
     if form is not None:
-        low, high = form.inner_bounds
-        inner = (
-            EffectParameter(
-                form.inner_name,
-                form.inner_name,
-                low=low,
-                high=high,
-                first_trial=form.inner_default,
-                range_source=form.source,
-            ),
-        )
+        own = form.inner_name, form.inner_name, "", *form.inner_bounds, "one", form.inner_default
+        free.append(EffectParameter(*own, range_source=form.source))
     return LibraryTerm(
         name=term.name,
-        parameters=(
-            EffectParameter(
-                "coefficient",
-                "c",
-                low=-10.0,
-                high=10.0,
-                first_trial=0.01,
-                range_source="with stresses over the modulus and rates times the relaxation time, "
-                "the coefficients of known laws are of order one (Bird, Armstrong & Hassager 1987, "
-                "ch. 7); ten times leaves room",
-            ),
-            *inner,
-        ),
+        parameters=tuple(free),
         equation=rf"h \mathrel{{+}}= c\,{term.latex()}",
         source="Smith 1971, Int. J. Eng. Sci. 9, 899: isotropic functions of two tensors",
         check="A flow of another kind, such as step strain or extension.",

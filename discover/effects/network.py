@@ -7,24 +7,12 @@ import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter, ModeEffect
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.textbook.classical import (
-    ExponentialPhanThienTanner,
-    Giesekus,
-    JohnsonSegalman,
-    LinearPhanThienTanner,
-    fene_p,
-    fene_p_terms,
-)
-from discover.laws.textbook.scaled_relaxation import Saramito
+from discover.laws.textbook import classical
 from tensor_library import LawTerm, identity_like, inner
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):
-    """Adds c tr(σ·γ̇)[(1 + β)σ + I] [Likhtman & Graham 2003, JNNFM 114, 1].
-
-    c = 1/3 is Rolie–Poly without stretch; β = 0 are partly retracting strands, with c = 1/3 rigid
-    rods [Larson 1984, J. Rheol. 28, 545].
-    """
+    """Adds c tr(σ·γ̇)[(1 + β)σ + I] [Likhtman & Graham 2003; β = 0: Larson 1984, J. Rheol. 28]."""
 
     def extra_term(self, values, stress, rate):
         release = (1.0 + values[1]) * stress + identity_like(stress)
@@ -62,17 +50,13 @@ CONVECTIVE_CONSTRAINT_RELEASE = ConvectiveConstraintRelease(
 
 
 class FiniteExtensibility(ConstitutiveEffect):
-    """Turns the Maxwell law into FENE-P [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
-
-    In stress form, with q = 1/L² and f = 1 + q tr σ: the term of `discover.laws.FenePeterlin` with
-    1 − q tr A = (1 − 3q)/f. Its rate comes from eliminating A, so the law stays well-posed.
-    """
+    """Turns Maxwell into FENE-P with q = 1/L²   [Bird, Dotson & Johnson 1980, JNNFM 7, 213]."""
 
     def extra_term(self, values, stress, rate):
-        return fene_p(values[0], 1.0 - 3.0 * values[0], stress, rate)
+        return classical.fene_p(values[0], 1.0 - 3.0 * values[0], stress, rate)
 
     def as_terms(self, values):
-        return fene_p_terms(values[0])
+        return classical.fene_p_terms(values[0])
 
 
 FINITE_EXTENSIBILITY = FiniteExtensibility(
@@ -108,7 +92,7 @@ class AddedLaw(ConstitutiveEffect):
 
 
 GIESEKUS_MOBILITY = AddedLaw(
-    name="giesekus_mobility", law=Giesekus,
+    name="giesekus_mobility", law=classical.Giesekus,
     parameters=(
         EffectParameter(
             "alpha", r"\alpha", meaning="mobility", low=0.0, high=1.0, first_trial=0.01,
@@ -123,7 +107,7 @@ GIESEKUS_MOBILITY = AddedLaw(
 
 
 NON_AFFINE_MOTION = AddedLaw(
-    name="non_affine_motion", law=JohnsonSegalman, explicit_rate=True,
+    name="non_affine_motion", law=classical.JohnsonSegalman, explicit_rate=True,
     parameters=(
         EffectParameter(
             "xi", r"\xi", meaning="slip of the network", low=0.0, high=1.0, first_trial=0.01,
@@ -148,7 +132,7 @@ _ELONGATION = EffectParameter(
 
 
 PTT_EXPONENTIAL = AddedLaw(
-    name="ptt_exponential", law=ExponentialPhanThienTanner, complexity=2,
+    name="ptt_exponential", law=classical.ExponentialPhanThienTanner, complexity=2,
     parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
     source="Phan-Thien 1978, J. Rheol. 22, 259",
@@ -158,7 +142,7 @@ PTT_EXPONENTIAL = AddedLaw(
 
 
 PTT_LINEAR = AddedLaw(
-    name="ptt_linear", law=LinearPhanThienTanner,
+    name="ptt_linear", law=classical.LinearPhanThienTanner,
     parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
     source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
@@ -172,12 +156,9 @@ _AT_REST = 1e-300
 
 
 class StrainDamping(ConstitutiveEffect):
-    """Adds n λ|γ̇| (σ + I), with |γ̇|² = ½ γ̇:γ̇.
+    """Adds n λ|γ̇| (σ + I), |γ̇|² = ½ γ̇:γ̇: strands lost for good [Wagner & Stephenson 1979].
 
-    After a strain γ the share e^{−nγ} of the strands carries stress: where the flow does not turn,
-    K-BKZ with Wagner's damping function [Wagner 1976, Rheol. Acta 15, 136]. Strain adds up without
-    regard to sign: lost strands do not come back [after Wagner & Stephenson 1979, J. Rheol. 23,
-    489].
+    Where the flow does not turn, K-BKZ with Wagner's damping function e^{−nγ} [Wagner 1976].
     """
 
     # Finger's and Cauchy's tensor in any proportion have one σ12 and N1   [Wagner & Demarmels 1990]
@@ -207,7 +188,7 @@ STRAIN_DAMPING = StrainDamping(
 
 # only the stress beyond yield relaxes, with the factor max(0, 1 − Y/|σ_d|)
 YIELD_STRESS = AddedLaw(
-    name="yield_stress", law=Saramito, complexity=2,
+    name="yield_stress", law=classical.Saramito, complexity=2,
     parameters=(
         EffectParameter(
             "yield_strain", "Y", low=0.0, high=10.0, first_trial=0.01,

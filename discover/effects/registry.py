@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from discover.effects import base, kinematic, memory, network, signal, structure
+from discover.effects import base, kinematic, network, signal, structure
 from discover.effects.base import AbstractEffect, StateEffect
 from discover.effects.library_term import library_term
 from discover.errors import InputError, Problems
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def _built_in() -> dict[str, base.AbstractEffect]:
-    modules = (network, memory, structure, kinematic, signal)
+    modules = (network, structure, kinematic, signal)
     found = [e for m in modules for e in vars(m).values() if isinstance(e, base.AbstractEffect)]
     return {effect.name: effect for effect in sorted(found, key=lambda e: (e.kind, e.name))}
 
@@ -68,14 +68,10 @@ def effects_table() -> "pd.DataFrame":
 
 
 def register_effect(effect: base.AbstractEffect) -> base.AbstractEffect:
-    """Make an effect of one's own known by name to studies and loops in this process.
+    """Make an effect of one's own known to studies and loops in this process.
 
-    An installed package does so in every process: see docs/adding-an-effect.md.
-
-    Raises
-    ------
-    InputError
-        If it is no effect, has no parameter, or its name is taken or is none.
+    An installed package does so in every process: see docs/adding-an-effect.md. Raises InputError
+    if it is no effect, has no parameter, or its name is taken or none.
 
     Examples
     --------
@@ -170,11 +166,7 @@ class KnownEffect:
 
 
 def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect, ...]:
-    """Return the effects that a study or a program names.
-
-    `written`: effect → parameter → value or ``"fit"``. `where`: the place, for messages. Raises
-    InputError if a name is unknown, a parameter missing, or a value outside its range.
-    """
+    """Return effects as a study names them, effect → parameter → value or ``"fit"``."""
     if not isinstance(written, Mapping):
         raise InputError(
             f"{where} must name effects with their values, such as "
@@ -237,16 +229,9 @@ def _value(asked: object, parameter: base.EffectParameter, where: str) -> float 
 def spelled_apart(effects: Iterable[AbstractEffect]) -> dict[str, Spelled]:
     r"""Return equations and letters of effects that stand together, by name of the effect.
 
-    A letter that an earlier effect has gets a prime, in an order of their names, so that equation
-    and table agree in whatever order they list effects. States come first, so that a law with them
-    alone is spelled as it is on a page with effects of the instrument.
-
-    Examples
-    --------
-    >>> from discover.effects import make_effect
-    >>> both = map(make_effect, ("thixotropy", "thixotropic_relaxation"))
-    >>> spelled_apart(both)["thixotropy"].symbols["build_up_time"]
-    "t_\\mathrm{b}'"
+    A letter that an earlier effect has gets a prime, in an order of names, so that equation and
+    table agree; states first, so that a law with them alone is spelled as it is beside an
+    instrument's.
     """
     taken: set[str] = set()
     found = {}

@@ -8,10 +8,7 @@ from discover.effects.kinematic import first_order_lag
 
 
 class BearingFriction(SignalEffect):
-    """A torque against the motion, of constant size, is recorded with the stress (Coulomb).
-
-    It follows the rate of the tool, whatever the fluid feels of that.
-    """
+    """A constant torque against the tool's motion is recorded with the stress (Coulomb)."""
 
     acts_on_steady_states = takes_numpy = True
 
@@ -39,12 +36,7 @@ BEARING_FRICTION = BearingFriction(
 
 
 class EdgeFracture(SignalEffect):
-    """Beyond a strain the sheared area, and with it the torque, shrinks exponentially.
-
-    The strain is the total one, in both directions. Empirical: theory says when an edge breaks
-    [Tanner & Keentok 1983, J. Rheol. 27, 47], experiment that the torque then falls cycle by cycle
-    [Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929].
-    """
+    """Beyond a total strain, in both directions, the torque shrinks exponentially. Empirical."""
 
     takes_numpy = True
 
@@ -86,10 +78,7 @@ _JUMP = 1e-9
 
 
 class InstrumentInertia(SignalEffect):
-    """The stress recorded contains the inertia of the tool; negative if over-corrected.
-
-    It follows the rate of the tool, whatever the fluid feels of that.
-    """
+    """The stress recorded contains the inertia of the tool; negative if over-corrected."""
 
     takes_numpy = True
 
@@ -228,10 +217,7 @@ STRESS_OFFSET = StressOffset(
 
 
 class TimeDelay(SignalEffect):
-    """The stress recorded is the true one some time earlier, on the instrument's clock.
-
-    It is zero before the flow starts.
-    """
+    """The stress recorded is the true one earlier on the instrument's clock, zero at first."""
 
     takes_numpy = True
 

@@ -76,13 +76,8 @@ class Equation(NotebookView):
 
     Examples
     --------
-    A Giesekus fluid with a mobility of 0.2, 100 Pa and 2 s:
-
-    >>> fluid = Equation((LawTerm("sigma.sigma", 0.2),), (100.0,), (2.0,))
-    >>> fluid.sympy()
+    >>> Equation((LawTerm("sigma.sigma", 0.2),), (100.0,), (2.0,)).sympy()  # a Giesekus fluid
     0.2*sigma**2
-    >>> fluid.mean_relaxation_time
-    2.0
     """
 
     terms: tuple[LawTerm, ...]  # h as a sum, dimensionless: stress over G, time over λ
@@ -124,10 +119,7 @@ class Equation(NotebookView):
         return mean_relaxation_time(self.modulus, self.relaxation_time)
 
     def of_times(self, factor: float) -> "Equation":
-        """Return the fluid at a temperature where all its times are a factor of those here.
-
-        [Ferry 1980, ch. 11: moduli are the same].
-        """
+        """Fluid whose times are a factor of those here, moduli the same [Ferry 1980, ch. 11]."""
         return replace(
             self,
             relaxation_time=tuple(factor * time for time in self.relaxation_time),
@@ -147,11 +139,7 @@ class Equation(NotebookView):
         )
 
     def law(self) -> AbstractConstitutiveLaw:
-        """Return h as a dimensionless law that can be simulated.
-
-        Raises InputError if constants differ from mode to mode, or the fluid has a state of its
-        own.
-        """
+        """Return h as a dimensionless law; InputError if modes differ, or it has a state."""
         if self.states:
             raise InputError(
                 f"{', '.join(part.effect for part in self.states)} gives the whole fluid a state, "
@@ -194,6 +182,18 @@ class Equation(NotebookView):
         """Equations and letters of the states, no letter twice, in LaTeX."""
         spelled = spelled_apart(part.own for part in self.states)
         return [spelled[part.effect] for part in self.states]
+
+    @property
+    def header(self) -> list[str]:
+        """Origin, notes and tested box as plain lines that no file format takes amiss."""
+        lines = [self.title, *self.notes, *(() if self.tested is None else self.tested.lines)]
+        whole = (" ".join(line.split()) for line in lines if line)
+        # without anything that could end a comment or a string
+        kept = (
+            "".join(c if c.isprintable() and c not in "\"'`\\" else "_" for c in line)
+            for line in whole
+        )
+        return [line.replace("*/", "* /")[:300] for line in kept]
 
     def modes_table(self) -> pd.DataFrame:
         """Return G_k in Pa and λ_k in s, one line for each mode, and what differs by mode."""
@@ -240,8 +240,7 @@ def flow_numbers(
 ) -> tuple[float, float]:
     """Return Wi = λ̄ max|γ̇| and De of one flow: λ̄ω in oscillation, else λ̄/T with its length T.
 
-    `times`, `shear_rate` in s and 1/s. `relaxation_time`: λ̄ in s. `frequency`: ω in rad/s where
-    known; otherwise from the changes of sign of the rate.
+    Times and rates (n,) in s and 1/s, λ̄ in s, ω in rad/s; by default from changes of sign.
     """
     length = float(times[-1]) if times[-1] > 0 else 1.0
     if frequency is None:

@@ -10,18 +10,20 @@ from typing import Any, Literal
 from pydantic import Field
 
 from discover.dataset.tables.table import read_bytes
+from discover.effects.registry import Spelled
 from discover.equations.equation import Box, Equation, Tested
 from discover.equations.formats.code import numpy_code, sympy_code
 from discover.equations.formats.in_a_solver import in_a_solver
-from discover.equations.formats.latex_file import equation_latex
 from discover.equations.formats.rheotool import rheotool_text
 from discover.equations.formats.ufl import ufl_code
 from discover.equations.parts import NamedPart, StatePart
+from discover.equations.spelling.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex
 from discover.errors import InputError
 from discover.plain_numbers import json_text, parse_json
 from discover.validation import Section, validated
 from discover.words import unknown_name
 from tensor_library.law_terms import LawTerm
+from tensor_library.notation import LatexNotation, latex_number
 
 COMPARISON, LOOP, FIT, BATCH = "comparison.json", "loop.json", "fit.json", "batch.json"
 AUGMENTED, NEAREST, ANSWER = "augmented", "nearest_law", "answer"
@@ -30,11 +32,7 @@ of a comparison or a fit."""
 
 
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
-    """Return the laws in a folder of results by name: those of the learners, or the only one.
-
-    `folder`: of ``discover compare``, ``close-loop`` or ``fit``, or its JSON file. Raises
-    InputError if there is no result, it is damaged, or its law cannot be written out.
-    """
+    """Laws in a folder of results, or its JSON file, by name; InputError if there is none."""
     return _laws(*read_result(folder))
 
 
@@ -210,6 +208,49 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
         )  # fmt: skip
     except ValueError as error:
         raise InputError(f"{where}: {error} {again}") from None
+
+
+def equation_latex(equation: Equation, digits: int = 9) -> str:
+    """Return an equation with its modes, solvent and tested box as a piece of a LaTeX document."""
+    lines = [PREAMBLE + "".join(f"% {line}\n" for line in equation.header)]
+    named = equation.named
+    law = law_latex(equation.terms, equation.linear_relaxation, digits, named)
+    # what a law with a name defines on the way would not fit into one line
+    law, *where = [law] if named is None else law.split(SEPARATOR)
+    lines.append(f"\\begin{{equation}}\n  {law}\n\\end{{equation}}\n")
+    if where:
+        rows = " \\\\\n".join("  " + one.replace(" = ", " &= ", 1) for one in where)
+        lines.append(f"\\begin{{align}}\n{rows}\n\\end{{align}}\n")
+    for part, spelled in zip(equation.states, equation.spelled_states, strict=True):
+        lines.append(_state(part, spelled, digits))
+    letters = {} if named is None else latex_letters(named, LatexNotation(digits))
+    if named is not None:
+        lines += [f"% {letters[n]}: {n} of the law {named.law}" for n in named.constants[0]]
+    lines.append("% modes: modulus in Pa, relaxation time in s\n\\begin{align}")
+    for k, (g, time) in enumerate(zip(equation.modulus, equation.relaxation_time, strict=True)):
+        own = [("G_{k}", g, r"\,\mathrm{Pa}"), (r"\lambda_{k}", time, r"\,\mathrm{s}")]
+        own += [(letters[n], named.of_mode(k)[n], "") for n in named.differing] if named else []
+        entries = (
+            f"{letter.replace('_{k}', f'_{{{k + 1}}}')} &= {latex_number(value, digits)}{unit}"
+            for letter, value, unit in own
+        )
+        lines.append(f"  {', & '.join(entries)} \\\\")
+    lines.append(
+        f"  \\eta_\\mathrm{{s}} &= {latex_number(equation.solvent_viscosity, digits)}"
+        "\\,\\mathrm{Pa\\,s}\n\\end{align}\n"
+    )
+    return "\n".join(lines)
+
+
+def _state(part: StatePart, spelled: Spelled, digits: int) -> str:
+    """Return the equation of a state of the whole fluid, with its numbers."""
+    numbers = ",\\quad ".join(
+        f"{spelled.symbols[p.name]} = {latex_number(part.values[p.name], digits)}"
+        + (rf"\,\mathrm{{{p.unit}}}" if p.unit else "")
+        for p in part.own.parameters
+    )
+    lines = [f"% {part.effect}, of the whole fluid", "\\begin{gather}"]
+    return "\n".join([*lines, f"  {spelled.equation} \\\\", f"  {numbers}", "\\end{gather}\n"])
 
 
 def _free_of_rounding(write: Callable[..., str]) -> Callable[..., str]:

@@ -14,7 +14,7 @@ from discover.effects import ConstitutiveEffect, StateEffect, WrittenState, know
 from discover.effects.base import POWERS_OF_TIME
 from discover.errors import InputError
 from discover.laws import LAWS, AbstractConstitutiveLaw, make_law
-from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
+from discover.laws.base import AbstractExtendedLaw, State
 from discover.laws.each_mode import LawOfEachMode, law_of_mode
 from discover.laws.registry import name_of
 from tensor_library import CLOSED_FORMS, LawTerm
@@ -24,15 +24,7 @@ from tensor_library.isotropic_function import IsotropicFunction
 
 @dataclass(frozen=True)
 class NamedPart:
-    """Law by its name, with dimensionless constants once for all modes, or once for each.
-
-    Raises InputError if there is no such law, or a parameter is missing, unknown or out of range.
-
-    Examples
-    --------
-    >>> NamedPart("saramito", ({"yield_strain": 0.3}, {"yield_strain": 0.1})).differing
-    ('yield_strain',)
-    """
+    """Law by its name, with dimensionless constants once for all modes, or once for each."""
 
     law: str  # key of `discover.laws.LAWS`
     constants: tuple[Mapping[str, float], ...]
@@ -81,16 +73,7 @@ class NamedPart:
 
 @dataclass(frozen=True)
 class StatePart:
-    """Effect with a state by its name, one state for all modes.
-
-    Raises InputError if there is no such effect, it has no written state, or a parameter is
-    missing, unknown or out of range.
-
-    Examples
-    --------
-    >>> StatePart("thixotropy", {"breakdown": 0.2, "build_up_time": 5.0}).at_rest
-    (1.0,)
-    """
+    """Effect with a state by its name, one state for all modes; InputError if it cannot be."""
 
     effect: str  # name of the effect, one of `dc.effects()` with a state
     values: Mapping[str, float]  # its parameters by name, in their units
@@ -141,8 +124,7 @@ class StatePart:
     ) -> tuple[list[str], str, str]:
         """Return the rates of change, and the factors on stress and times, as text.
 
-        `spelled`: writes an expression with texts for its scalars: `letters` of the parameters, the
-        levels, ``shear_rate`` and ``shear_stress``.
+        `spelled`: writes an expression with texts for its scalars, `letters`.
         """
         import sympy
 
@@ -203,28 +185,11 @@ class AugmentedLaw(AbstractExtendedLaw):
         """Return that of the declared law: at rest what an effect adds may have no derivative."""
         return self.base.trace_relaxation(stress)
 
-    def extra_term(self, stress: State, rate: Symmetric) -> State:
-        """Return h of the declared law plus the terms of the effects."""
-        extra, own = self.base.extra_term(stress, rate), stress_in(stress)
-        for effect, values in zip(self.effects, self.values, strict=True):
-            extra = extra + as_state(effect.extra_term(jnp.asarray(values), own, rate), stress)
-        return extra
-
-    def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return the terms of the declared law, then those of the effects; None if it is no sum.
-
-        Raises InputError if what an effect adds is none.
-        """
-        below = self.base.as_terms()
-        return None if below is None else below + self._added_terms()
-
-    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
-        """Return the declared law, and the terms of the effects.
-
-        Raises InputError if what an effect adds is not a sum of library terms.
-        """
-        core, terms = self.base.split()
-        return core, terms + self._added_terms()
+    def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return the sum of what the effects add."""
+        pairs = zip(self.effects, self.values, strict=True)
+        added = (effect.extra_term(jnp.asarray(values), stress, rate) for effect, values in pairs)
+        return sum(added, jnp.zeros_like(stress))
 
     def of_terms(self) -> "tuple[AugmentedLaw, tuple[ConstitutiveEffect, ...]]":
         """Return the law with those effects that are sums of library terms, and the others."""
@@ -237,11 +202,7 @@ class AugmentedLaw(AbstractExtendedLaw):
         return law, tuple(one for i, one in enumerate(self.effects) if i not in kept)
 
     def with_named(self, name: str) -> "tuple[AugmentedLaw, str] | None":
-        """Return the law with an effect made part of the declared one, and that one's constant.
-
-        None unless a named law is the effect alone, with its amplitude for the only constant, as
-        Giesekus's mobility, and the declared law has no terms.
-        """
+        """Law with an effect made part of a declared Maxwell, and its constant; or None."""
         effects = [effect.name for effect in self.effects]
         if name not in effects or self.base.as_terms() != ():
             return None
@@ -254,7 +215,8 @@ class AugmentedLaw(AbstractExtendedLaw):
             return replace(self, base=base, values=values, effects=effects), constant
         return None
 
-    def _added_terms(self) -> tuple[LawTerm, ...]:
+    def own_terms(self) -> tuple[LawTerm, ...]:
+        """Return the terms of the effects."""
         return tuple(
             term
             for effect, values in zip(self.effects, self.values, strict=True)
@@ -267,10 +229,7 @@ LawParts = tuple[NamedPart | None, tuple[LawTerm, ...]]
 
 
 def law_parts(law: AbstractConstitutiveLaw) -> LawParts:
-    """Return h of a law as a named law, where one is needed, and a sum of terms.
-
-    Raises InputError if it is neither; a law with constants of each mode needs a name.
-    """
+    """Return h as a named law, where one is needed, and a sum of terms; InputError if neither."""
     if law.as_terms() is not None:
         return None, law_terms(law)
     core, added = law.split()
@@ -287,12 +246,7 @@ def law_parts(law: AbstractConstitutiveLaw) -> LawParts:
 def law_parts_by_mode(
     law: AbstractConstitutiveLaw, by_mode: Mapping[str, Sequence[float]], modes: int
 ) -> LawParts:
-    """Return the parts of a law some constants of which differ from mode to mode.
-
-    `by_mode`: values for each mode, by name of a constant, or of an effect that is a law by itself.
-    Raises InputError as `law_parts`, or if what differs is no constant of a law with a name, or a
-    mode was added.
-    """
+    """Return the parts of a law, constants of each mode by name, or by a one-constant effect."""
     if not by_mode:
         return law_parts(law)
     differing = dict(by_mode)

@@ -28,9 +28,7 @@ State = Symmetric | Float[Array, " s"]
 
 
 class AbstractConstitutiveLaw(eqx.Module):
-    """Maxwell-type law, dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h(σ, γ̇), dimensionless.
-
-    Time is scaled by the relaxation time and stress by the modulus. A law states its extra term h.
+    """Maxwell-type law, dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h(σ, γ̇), stress over modulus, time over λ.
 
     Attributes
     ----------
@@ -71,10 +69,7 @@ class AbstractConstitutiveLaw(eqx.Module):
         """Return h(σ, γ̇), in the storage of `stress`, with the variables where there are some."""
 
     def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return h as a sum of library terms; None if it is none, or the law does not say.
-
-        Raises InputError if it is none, and there is more to say of that.
-        """
+        """Return h as a sum of library terms; None, or InputError saying why, if it is none."""
         return None
 
     def split(self) -> tuple["AbstractConstitutiveLaw", tuple[LawTerm, ...]]:
@@ -82,10 +77,10 @@ class AbstractConstitutiveLaw(eqx.Module):
         return self, ()
 
     def trace_relaxation(self, stress: State) -> Float[Array, ""]:
-        """Return the rate, over 1/λ, at which h relaxes the trace of this stress beside −σ.
+        """Rate over 1/λ at which h relaxes the trace beside −σ, (1/3) ∂ tr h/∂I without flow.
 
-        (1/3) ∂ tr h/∂I without flow. Where `retracts`, integrators treat it implicitly at rest, so
-        that fast modes need no small steps; the solution does not depend on it.
+        Where `retracts`, integrators treat it implicitly at rest; the solution does not depend on
+        it.
         """
         still = jnp.zeros_like(stress_in(stress))
         unit = as_state(identity_like(still), stress)
@@ -93,10 +88,9 @@ class AbstractConstitutiveLaw(eqx.Module):
         return trace(stress_in(along)) / 3.0
 
     def relaxations(self) -> Float[Array, "t 2"]:
-        """Return the rates, over 1/λ and beside −1, at which σ and each tensor relax at rest.
+        """Rates over 1/λ beside −1 at which σ and each tensor relax at rest, for integrators.
 
-        First of the whole tensor, then by how much its trace is faster. For integrators, as
-        `trace_relaxation`.
+        First of the whole tensor, then by how much its trace is faster.
         """
         trace_alone = self.trace_relaxation(self.rest())[None]
         return jnp.stack([jnp.zeros_like(trace_alone), trace_alone], axis=1)
@@ -110,11 +104,10 @@ class AbstractConstitutiveLaw(eqx.Module):
         return identity_like(stress) + stress
 
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
-        """Return dσ/dt, and that of the variables.
+        """Return dσ/dt, and that of the variables, all dimensionless.
 
-        `stress`: dimensionless, (3, 3), or 11, 22, 33, 12 with the variables behind.
-        `velocity_gradient`: dimensionless L, (3, 3) for a full stress; four components or the
-        scalar shear rate for four.
+        `stress`: (3, 3), or 11, 22, 33, 12 with the variables behind, of which L may be a shear
+        rate.
         """
         rate = rate_of_deformation(velocity_gradient)
         own = stress_in(stress)
@@ -165,6 +158,31 @@ class AbstractExtendedLaw(AbstractConstitutiveLaw):
         """Return those of the base law."""
         return jnp.zeros(0) if self.base is None else self.base.shares()
 
+    def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return what is added to h of the base law."""
+        raise NotImplementedError
+
+    def own_terms(self) -> tuple[LawTerm, ...]:
+        """Return the same as a sum of library terms; InputError if it is none."""
+        raise NotImplementedError
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
+        """Return h of the base law and what is added to it."""
+        extra = as_state(self.own_term(stress_in(stress), rate), stress)
+        return extra if self.base is None else extra + self.base.extra_term(stress, rate)
+
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
+        """Return the terms of the base law, then those added; None if that is no sum."""
+        below = () if self.base is None else self.base.as_terms()
+        return None if below is None else below + self.own_terms()
+
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
+        """Return what the base law is, and the terms added to it."""
+        if self.base is None:
+            return self, ()
+        core, terms = self.base.split()
+        return core, terms + self.own_terms()
+
 
 def stress_in(state: State) -> Symmetric:
     """Return σ of a state, which has variables behind its four components where a law has some."""
@@ -188,10 +206,9 @@ class NamedLaw:
     """Law that can be asked for by name.
 
     `build`: makes the law from its parameters in the order of `parameters`: names and physical
-    ranges, dimensionless. `range_sources`: literature or argument for each range. `written`:
-    returns h with its constants as letters, to be written out; None if nobody said. `is_one_mode`:
-    whether at small strain the law is one Maxwell mode; otherwise ``"any"`` leaves it out, as the
-    modes of a sweep are not its own.
+    ranges, dimensionless. `range_sources`: literature or argument for each. `written`: returns h
+    with its constants as letters; None if nobody said. `is_one_mode`: whether at small strain the
+    law is one Maxwell mode; otherwise ``"any"`` leaves it out.
     """
 
     title: str  # name as a rheologist writes it

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, AbstractExtendedLaw, State
 from tensor_library.algebra import Symmetric
+from tensor_library.law_terms import LawTerm
 
 Tree = TypeVar("Tree")
 
@@ -19,8 +20,7 @@ Tree = TypeVar("Tree")
 class LawOfEachMode(AbstractExtendedLaw):
     """One law for each mode of a fluid: the same equation with constants of its own.
 
-    It stands for a law where a fluid takes one, alone or below added terms. What follows the modes
-    takes it apart by `over_modes` or `law_of_mode`, and there it is the law of that mode.
+    What follows the modes takes it apart by `over_modes` or `law_of_mode`.
     """
 
     law: AbstractConstitutiveLaw  # the law, with a leading axis of modes on every array
@@ -42,12 +42,16 @@ class LawOfEachMode(AbstractExtendedLaw):
         """Return h of the law, of one mode."""
         return self.law.extra_term(stress, rate)
 
+    def as_terms(self) -> None:
+        """Return None: the terms differ from mode to mode."""
+
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
+        """Return the law of each mode, with no terms beside."""
+        return self, ()
+
 
 def law_of_each_mode(laws: Sequence[AbstractConstitutiveLaw]) -> LawOfEachMode:
-    """Return the law of a fluid with one law for each of its modes, in their order.
-
-    Raises InputError if the laws differ in more than numbers, or carry further tensors.
-    """
+    """Law of a fluid with one law for each mode; InputError if they differ in more than numbers."""
     parts = [eqx.partition(law, eqx.is_array) for law in laws]
     kinds = {jax.tree.structure(arrays) for arrays, _ in parts}
     if len(kinds) != 1 or not all(eqx.tree_equal(parts[0][1], rest) for _, rest in parts):
@@ -67,10 +71,7 @@ def differs_by_mode(law: AbstractConstitutiveLaw) -> bool:
 
 
 def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callable[..., Any]:
-    """Return a function of one mode's law and numbers as one of all modes.
-
-    `tree`: a law, or what holds one. `axis`: of the modes, in the numbers and in what is returned.
-    """
+    """Return a function of one mode's law and numbers as one of all modes, along an `axis`."""
     own, shared = apart(tree)
 
     def of_mode(own, *numbers):
@@ -106,10 +107,7 @@ def with_modes(
     before: Float[Array, " k"] | np.ndarray,
     after: Float[Array, " m"] | np.ndarray,
 ) -> AbstractConstitutiveLaw:
-    """Return a law of modes with times `before` (s) as one of modes with times `after`.
-
-    Constants are interpolated evenly in log λ; beyond the ends they are those of the end.
-    """
+    """Interpolate a law of modes with times `before` to times `after`, in s, linearly in log λ."""
 
     def of_times(part):
         if not isinstance(part, LawOfEachMode):

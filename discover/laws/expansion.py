@@ -7,13 +7,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from discover.laws.base import (
-    AbstractConstitutiveLaw,
-    AbstractExtendedLaw,
-    State,
-    as_state,
-    stress_in,
-)
+from discover.laws.base import AbstractConstitutiveLaw, AbstractExtendedLaw
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.programs import on_device
 from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
@@ -21,10 +15,7 @@ from tensor_library.algebra import Symmetric
 
 
 class LibraryExpansion(AbstractExtendedLaw):
-    """h = Σ cₙ termₙ(σ, γ̇; inner), over a library of candidate terms.
-
-    `coefficients`: cₙ; a zero leaves a term out without recompiling.
-    """
+    """h = Σ cₙ termₙ(σ, γ̇; inner); a zero cₙ leaves a term out without recompiling."""
 
     coefficients: Float[Array, " n"]
     inner: Float[Array, " m"]  # inner parameters in the order of ``library.inner_names``
@@ -32,25 +23,13 @@ class LibraryExpansion(AbstractExtendedLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
     base: AbstractConstitutiveLaw | None = None  # a known law whose extra term is added, or None
 
-    def extra_term(self, stress: State, rate: Symmetric) -> State:
-        """Return h = Σ cₙ termₙ(σ, γ̇), plus the base law's."""
-        terms = self.library.evaluate(stress_in(stress), rate, self.inner)
-        extra = as_state(jnp.tensordot(self.coefficients, terms, axes=1), stress)
-        return extra if self.base is None else extra + self.base.extra_term(stress, rate)
+    def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return Σ cₙ termₙ(σ, γ̇)."""
+        terms = self.library.evaluate(stress, rate, self.inner)
+        return jnp.tensordot(self.coefficients, terms, axes=1)
 
-    def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return the terms whose coefficients differ from zero, behind those of the base law."""
-        below = () if self.base is None else self.base.as_terms()
-        return None if below is None else below + self._own_terms()
-
-    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
-        """Return the base law, and the terms."""
-        if self.base is None:
-            return self, ()
-        core, terms = self.base.split()
-        return core, terms + self._own_terms()
-
-    def _own_terms(self) -> tuple[LawTerm, ...]:
+    def own_terms(self) -> tuple[LawTerm, ...]:
+        """Return the terms whose coefficients differ from zero."""
         inner = dict(zip(self.library.inner_names, np.asarray(self.inner).tolist(), strict=True))
         return tuple(
             LawTerm(term.name, float(value), {name: inner[name] for name in term.inner_names})
@@ -62,10 +41,7 @@ class LibraryExpansion(AbstractExtendedLaw):
 def law_of_terms(
     terms: LawTerms, linear_relaxation: bool, base: AbstractConstitutiveLaw | None = None
 ) -> LibraryExpansion:
-    """Return the law h = Σ c term, added to the extra term of `base`.
-
-    Raises ValueError if a spelling is not canonical.
-    """
+    """Law h = Σ c term, added to the extra term of `base`; ValueError for no canonical spelling."""
     library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
     return expansion_of(terms, library, linear_relaxation, base)
 
@@ -89,11 +65,7 @@ _SHARED = build_library(degree=1)
 
 
 def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
-    """Return a law as an expansion on all terms of degree one, if it is a sum of some of them.
-
-    Such laws then share every program. Any other law is returned as it is, and so is a user's own,
-    which may write out another h than it computes.
-    """
+    """Return a plain sum of terms of degree one as an expansion on all: programs are shared."""
     if not _is_plain(law) or any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(law)):
         return law
     if isinstance(law, TensorBasisNetwork) and np.any(np.asarray(law.network_mask) != 0):

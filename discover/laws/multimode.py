@@ -49,21 +49,19 @@ class Fluid(eqx.Module):
     Attributes
     ----------
     law
-        Dimensionless law, by default upper-convected Maxwell; `LawOfEachMode` where constants
-        differ.
+        Dimensionless; by default upper-convected Maxwell.
     modulus, relaxation_time
         G_k in Pa and λ_k in s, shape (k,).
     solvent_viscosity
         η_s, in Pa s.
     modulus_covariance
         Of moduli from a noisy sweep in Pa², shape (k, k), or (k + 1, k + 1) with the solvent last;
-        None where they are exact. Learners widen their intervals by it; no flow depends on it.
+        learners widen their intervals by it.
 
     Examples
     --------
     >>> import discover as dc
-    >>> fluid = dc.Fluid(dc.make_law("ucm"), modulus=[100.0, 10.0], relaxation_time=[0.1, 1.0])
-    >>> fluid.n_modes
+    >>> dc.Fluid(dc.make_law("ucm"), modulus=[100.0, 10.0], relaxation_time=[0.1, 1.0]).n_modes
     2
     """
 
@@ -155,25 +153,19 @@ class Fluid(eqx.Module):
     def from_sweep(
         cls, sweep: Any, law: AbstractConstitutiveLaw | None = None, **options: Any
     ) -> "Fluid":
-        """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
+        """Fluid with the modes and solvent of a sweep; InputError if there is none, or too short.
 
         An elastic constant is its slowest mode, of the shortest time indistinguishable from a
         constant.
 
         Parameters
         ----------
-        sweep
-            Small-amplitude data, such as `Dataset.linear_sweep`.
-        law
-            Of every mode; by default upper-convected Maxwell.
+        sweep, law
+            Small-amplitude data, such as `Dataset.linear_sweep`; by default upper-convected
+            Maxwell.
         **options
-            `modes`, known `solvent_viscosity` and `elastic_modulus`, as of
+            `modes`, `solvent_viscosity`, `elastic_modulus`, as of
             `discover.dataset.relaxation_spectrum`.
-
-        Raises
-        ------
-        InputError
-            If there is no sweep, or it is too short.
         """
         if sweep is None:
             raise InputError(

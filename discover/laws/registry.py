@@ -1,12 +1,7 @@
-"""Named laws, as study files and the command line spell them.
+"""Named laws, as study files spell them: ``NAMED`` of the files in `textbook`, and a user's own."""
 
-A file in `textbook` with ``NAMED = {...}`` is built in; for a user's own see docs/adding-a-law.md.
-"""
-
-import importlib
 import inspect
 import math
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -18,9 +13,9 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from discover.errors import InputError, Problems
-from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, State, as_parameter
 from discover.laws.each_mode import law_of_mode
+from discover.laws.textbook import classical, pom_pom, rolie_poly
 from discover.plain_numbers import as_number, short
 from discover.validation import require_new_name
 from discover.words import nearest, unknown_name
@@ -45,10 +40,7 @@ class LawOfFunction(AbstractConstitutiveLaw):
 def law_of_function(
     name: str, function: Callable[..., Symmetric], names: tuple[str, ...]
 ) -> Callable[..., LawOfFunction]:
-    """Return what makes the law from the values of its parameters, in their order.
-
-    Raises InputError if the function does not take stress, rate and exactly these parameters.
-    """
+    """Return what makes the law from its parameters; InputError if the function takes others."""
     wanted = f"def {name}(stress, rate{''.join(f', {one}' for one in names)})"
     if not callable(function):
         raise InputError(f"extra_term must be a function, {wanted}; got {function!r}.")
@@ -73,12 +65,7 @@ if TYPE_CHECKING:
 
 
 def _named_laws() -> dict[str, NamedLaw]:
-    files = [module.name for module in pkgutil.iter_modules(textbook.__path__)]
-    laws: dict[str, NamedLaw] = {}
-    # those of textbooks come first in lists, in their order
-    for file in dict.fromkeys(["classical", *files]):
-        laws |= getattr(importlib.import_module(f"{textbook.__name__}.{file}"), "NAMED", {})
-    return laws
+    return {**classical.NAMED, **pom_pom.NAMED, **rolie_poly.NAMED}
 
 
 LAWS: Registry[NamedLaw] = Registry("law", "discover.laws", _named_laws)
@@ -142,32 +129,23 @@ def register_law(
     written: Callable[[], IsotropicFunction] | None = None, *,
     extra_term: Callable[..., Symmetric] | None = None,
 ) -> NamedLaw:  # fmt: skip
-    """Make a law of one's own known by name to studies, loops and exports in this process.
+    """Make a law of one's own known to studies, loops and exports in this process.
 
-    An installed package does so in every process: see docs/adding-a-law.md.
+    An installed package does so in every process: see docs/adding-a-law.md. Raises InputError if
+    the name is taken or none, a range is none, `build` makes no law, `extra_term` takes other
+    parameters or returns no tensor, or both or neither are given.
 
     Parameters
     ----------
-    name
-        As studies spell it: lower-case letters, digits and underscores.
-    build
-        Class of the law, or a function of its parameters in their order; or give `extra_term`.
+    name, title, source
+        As studies spell it: lower-case letters, digits and underscores; for readers; literature.
+    build, extra_term
+        Class of the law, or a function of its parameters; or h as a function of stress and rate,
+        dimensionless (3, 3), and of the parameters by name: λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h.
     parameters
         Name and admissible range (low, high) of each parameter, dimensionless.
-    title, source
-        Name for readers, by default `name` in words, and literature.
     written
-        Returns h written out, for a law that is no sum of terms; see
-        `tensor_library.isotropic_function`.
-    extra_term
-        h as a function of stress and rate, dimensionless (3, 3), and of the parameters by name, by
-        `tensor_library.algebra`: λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h.
-
-    Raises
-    ------
-    InputError
-        If the name is taken or is none, a range is none, `build` makes no law, `extra_term` does
-        not take these parameters or returns no tensor, or both or neither are given.
+        Returns h written out, for a law that is no sum of terms.
 
     Examples
     --------
@@ -248,19 +226,13 @@ def starting_values(law: str) -> dict[str, float]:
 
 
 def make_law(name: str, parameters: Mapping[str, float] | None = None) -> AbstractConstitutiveLaw:
-    """Return the named law with these parameters.
-
-    Raises
-    ------
-    InputError
-        If the law is unknown, or a parameter is missing, unknown or outside its range.
+    """Return the named law; InputError if it or a parameter is unknown, missing or out of range.
 
     Examples
     --------
     >>> import discover as dc
-    >>> law = dc.make_law("giesekus", {"alpha": 0.3})
-    >>> [(term.term, term.coefficient) for term in law.as_terms()]
-    [('sigma.sigma', 0.3)]
+    >>> [one.coefficient for one in dc.make_law("giesekus", {"alpha": 0.3}).as_terms()]
+    [0.3]
     """
     if not (parameters is None or isinstance(parameters, Mapping)):
         raise InputError(

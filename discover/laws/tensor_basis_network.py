@@ -6,13 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.errors import InputError
-from discover.laws.base import (
-    AbstractConstitutiveLaw,
-    AbstractExtendedLaw,
-    State,
-    as_state,
-    stress_in,
-)
+from discover.laws.base import AbstractConstitutiveLaw, AbstractExtendedLaw
 from tensor_library.algebra import TENSOR_NAMES, Symmetric, integrity_basis, scalar_invariants
 from tensor_library.law_terms import LawTerm
 
@@ -33,9 +27,8 @@ def _unchanged(value: Float[Array, ""]) -> Float[Array, ""]:
 class TensorBasisNetwork(AbstractExtendedLaw):
     """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron [Ling et al. 2016, JFM 807, 155].
 
-    gₙ = cₙ + mₙ MLPₙ(invariants); the paper's network has cₙ = 0 and bare invariants. `network`:
-    eight invariants in, eight numbers out; None where all coefficients are constant.
-    `invariant_scale`: typical size of each invariant, which the network sees as
+    gₙ = cₙ + mₙ MLPₙ(invariants); in the paper cₙ = 0 and invariants are bare. `network`: eight
+    numbers of eight invariants; None where all gₙ are constant. `invariant_scale`: the network sees
     asinh(invariant/scale); None for bare ones.
     """
 
@@ -74,25 +67,12 @@ class TensorBasisNetwork(AbstractExtendedLaw):
         """Return Σ gₙ Tₙ, without the base law's."""
         return jnp.tensordot(self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1)
 
-    def extra_term(self, stress: State, rate: Symmetric) -> State:
-        """Return h = Σ gₙ Tₙ, plus the base law's."""
-        extra = as_state(self.own_term(stress_in(stress), rate), stress)
-        return extra if self.base is None else extra + self.base.extra_term(stress, rate)
-
-    def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return the constants as coefficients, behind the terms of the base law.
-
-        Raises InputError if a coefficient varies with the invariants.
-        """
+    def own_terms(self) -> tuple[LawTerm, ...]:
+        """Return the constants as coefficients; InputError if one varies with the invariants."""
         if np.any(np.asarray(self.network_mask) != 0):
             raise InputError(
                 "The network's coefficients vary with the invariants, so it is no sum of terms. "
                 "Write out its projection on the library: the terms of its result."
             )
-        own = tuple(
-            LawTerm(name, float(value))
-            for name, value in zip(TENSOR_NAMES, np.asarray(self.constants), strict=True)
-            if float(value) != 0.0
-        )
-        below = () if self.base is None else self.base.as_terms()
-        return None if below is None else below + own
+        pairs = zip(TENSOR_NAMES, np.asarray(self.constants).tolist(), strict=True)
+        return tuple(LawTerm(name, value) for name, value in pairs if value != 0.0)

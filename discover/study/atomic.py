@@ -17,11 +17,7 @@ PART_SUFFIX = ".discover-part"
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a text file so that no reader ever sees half of it; a former one keeps its rights.
-
-    Raises InputError if the name is not that of a plain file, or of one that this command has read;
-    OSError if the disk is full, say: what the file held before is still there.
-    """
+    """Write a text file whole or not at all; InputError for no plain file, or one that was read."""
     path = Path(path)
     before = replaceable(path)
     mode = 0o666 if before is None else stat.S_IMODE(before.st_mode) & 0o777
@@ -49,10 +45,7 @@ def write_text(path: str | Path, text: str) -> Path:
 
 
 def replaceable(path: Path) -> os.stat_result | None:
-    """Return what the system says of a file that may be replaced; None if there is none.
-
-    Raises InputError if what has the name is no plain file, or a file that this command has read.
-    """
+    """Return the status of a file that may be replaced; None without, InputError if it may not."""
     try:
         found = os.lstat(path)
     except OSError:
@@ -110,10 +103,7 @@ _held: "weakref.WeakValueDictionary[str, FolderLock]" = weakref.WeakValueDiction
 
 
 class FolderLock:
-    """A lock on a folder, held until `release`, until it is forgotten, or until the process ends.
-
-    Where a system or its disk knows no locks, there is none.
-    """
+    """A lock on a folder, until `release`, or the process ends; none where a disk knows none."""
 
     def __init__(self, path: Path, descriptor: int):
         self.path = path
@@ -125,10 +115,7 @@ class FolderLock:
 
 
 def lock_folder(folder: str | Path) -> FolderLock:
-    """Lock a folder for this process; returns the same lock if this process holds it already.
-
-    Raises InputError if another process works in the folder; the message names it.
-    """
+    """Lock a folder for this process, once; InputError names another process that works in it."""
     path = Path(folder).resolve() / LOCK_FILE
     held = _held.get(str(path))
     if held is not None and held._finalizer.alive:

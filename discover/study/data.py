@@ -45,10 +45,7 @@ def temperature(study: Study, dataset: Dataset) -> float | None:
 
 
 def load_study_data(study: Study, seed: int | None = None) -> StudyData:
-    """Return the data of a study, split into runs to fit and runs held out.
-
-    Raises InputError if a file is wrong, a run does not exist or is a copy, or nothing is to fit.
-    """
+    """Divide a study into runs to fit and held out; InputError if a file or name is wrong."""
     data = study.data
     if data.synthetic is not None:
         made = data.synthetic
@@ -93,10 +90,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
 
 
 def _with_tables(dataset: Dataset, data: Data) -> tuple[Dataset, dict[str, str]]:
-    """Return the data with the tables beside the runs among them, and the role of each of those.
-
-    A table tests, unless the study says that it is fitted or there is nothing else to fit.
-    """
+    """Add the tables beside the runs, and return their roles: by default to test, if runs are."""
     kinds = (*TABLES, "lve")
     asked = {kind: role for kind in kinds if (role := getattr(data, kind)) is not None}
     dataset.with_material_functions(list(asked))  # those that are not there are refused
@@ -117,10 +111,7 @@ def _observed(
     dataset: Dataset, observe: Sequence[str], held_out: Sequence[str], fit: Sequence[str],
     asked: Sequence[str],
 ) -> tuple[Dataset, list[str], list[str]]:  # fmt: skip
-    """Return the data with every quantity as a record, those held out, and those fitted.
-
-    What is recorded and not observed only tests. `asked`: runs that must have something to fit.
-    """
+    """Return every quantity as a record, those held out, those fitted; `asked` must have some."""
     whole = dataset.quantity_by_quantity()
     missing = set(observe) - {run.quantity for run in whole}
     if missing:

@@ -251,8 +251,7 @@ def spectrum_of_modes(
 ) -> RelaxationSpectrum | None:
     """Return the spectrum of a sweep that has these modes, whose errors it knows; None if none has.
 
-    `solvent` in Pa s, `times` in s and `modulus` in Pa, shape (k,). One factor on all times may
-    have been fitted, and without moduli one on these.
+    `solvent` in Pa s, `times` in s, `modulus` in Pa, shape (k,); one factor on all is allowed.
     """
     asked: tuple[dict[str, Any], ...]
     asked = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
@@ -288,8 +287,8 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
 def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
     """Return a modulus in Pa and a relaxation time in s of the right order from the runs.
 
-    The time is a tenth of the median duration, or the inverse of a middle rate or frequency; the
-    modulus is the largest stress over rate times that.
+    A tenth of the median duration, or an inverse middle rate; the largest stress over rate times
+    it.
     """
 
     def slowest(run: Run) -> float:

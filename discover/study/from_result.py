@@ -48,10 +48,7 @@ class EarlierResult:
 
 
 def result_file(written: str, study_file: Path | None) -> Path:
-    """Return the file of an earlier result; InputError if there is none, or it is not finished.
-
-    `written`: the folder, relative to the study file or to the working directory.
-    """
+    """File of an earlier result's folder; InputError if there is none, or it is unfinished."""
     folders = [Path(written)]
     if study_file is not None:
         folders.insert(0, study_file.parent / written)

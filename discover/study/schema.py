@@ -207,9 +207,7 @@ class Data(Section):
 class Model(Section):
     """The declared law: the known part of what is to be found.
 
-    The modes are one by default, listed by hand (`modulus_Pa` and `relaxation_time_s` as lists), or
-    of the sweep: ``modes = "lve"`` as many as it supports, ``modes = 3`` that many. The solvent is
-    that of the sweep where none is given, and the sweep is fitted beside one that is.
+    Modes: one, listed by hand, or of the sweep, as is the solvent where none is given.
     """
 
     law: LawNames = "ucm"

@@ -29,7 +29,7 @@ from discover.effects import (
 from discover.effects.kinematic import first_order_lag
 from discover.effects.registry import spelled_apart
 from discover.equations import Equation
-from discover.equations.formats.latex_file import equation_latex
+from discover.equations.files import equation_latex
 from discover.equations.parts import StatePart
 from discover.errors import InputError
 from discover.forward import data_scales

@@ -15,7 +15,7 @@ from discover.dataset.checking import linear_theory, start_up
 from discover.dataset.checking import runs as run_checks
 from discover.dataset.checking.runs import Finding, Findings, Severity, found
 from discover.dataset.index_of_runs import read_index
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.load import SWEEP_FILE
 from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.run import Run, require_signal
@@ -40,8 +40,8 @@ _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 def check_folder(folder: str | Path, clock_factor: str | None = None) -> Findings:
     """Return what is wrong, doubtful or worth knowing about a data folder; errors come first.
 
-    Nothing is simulated: a run is compared with itself, with what a passive fluid at rest can do,
-    and with linear viscoelasticity. `folder`, `clock_factor`: as in `load_dataset`.
+    A run is compared with itself, with what a passive fluid at rest can do, and with linear
+    viscoelasticity. `folder`, `clock_factor`: as in `load_dataset`.
 
     Examples
     --------
@@ -74,8 +74,11 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
     findings += _of_columns([*read.samples.values()], beside)
     spectrum = None
     if sweep is not None:
-        spectrum, of_sweep = _spectrum(sweep)
-        findings += of_sweep
+        try:
+            spectrum = relaxation_spectrum(sweep)
+            findings += linear_theory.doubts_of_sweep(sweep, spectrum)
+        except (InputError, RuntimeError, np.linalg.LinAlgError) as wrong:
+            findings.append(found("no_spectrum", SWEEP_FILE, why=wrong))
     elif ("sweep", SWEEP_FILE) not in read.wrong:
         findings.append(found("no_sweep", SWEEP_FILE))
     transients = [run for run in runs if run.protocol.control == "rate"]
@@ -86,21 +89,17 @@ def check_folder(folder: str | Path, clock_factor: str | None = None) -> Finding
     if clock_factor is None and not _shift_columns(index):
         findings += run_checks.doubts_of_temperature(runs)
     findings += _of_tables(read)
-    findings += [*_others(root, names), *_copies([*runs, *read.tables.values()])]
+    with suppress(OSError):
+        known = {*names, *load.DATA_FILES}
+        tables = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))
+        findings += [found("not_listed", name) for name in tables if name not in known]
+    findings += _copies([*runs, *read.tables.values()])
     rank = get_args(Severity)
     return Findings(sorted(findings, key=lambda finding: rank.index(finding.severity)))
 
 
 def _errors(subject: str, file: str, wrong: InputError) -> list[Finding]:
     return [Finding("error", subject, file, one) for one in problems_in(str(wrong))]
-
-
-def _spectrum(sweep: load.LinearSweep) -> tuple[RelaxationSpectrum | None, list[Finding]]:
-    try:
-        spectrum = relaxation_spectrum(sweep)
-    except (InputError, RuntimeError, np.linalg.LinAlgError) as wrong:
-        return None, [found("no_spectrum", SWEEP_FILE, why=wrong)]
-    return spectrum, list(linear_theory.doubts_of_sweep(sweep, spectrum))
 
 
 def _of_tables(read: load.Folder) -> Iterator[Finding]:
@@ -193,14 +192,6 @@ def _of_columns(runs: Sequence[Table], beside: Sequence[Table]) -> Iterator[Find
         for text, files in by_text.items():
             several = f"{files[0]} and {len(files) - 1} more files" if len(files) > 1 else files[0]
             yield found(check, files[0], files=several, column=shown(text), how=text)
-
-
-def _others(root: Path, names: Sequence[str]) -> Iterator[Finding]:
-    """Yield which tables nothing reads."""
-    with suppress(OSError):
-        for name in sorted(os.listdir(root)):
-            if name.lower().endswith(".csv") and name not in {*names, *load.DATA_FILES}:
-                yield found("not_listed", name)
 
 
 def _copies(runs: list[Run]) -> Iterator[Finding]:

@@ -1,19 +1,17 @@
 """Doubts about sweeps by themselves, and about runs held against linear viscoelasticity."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import chdtrc
 
 from discover.dataset.checking.runs import Finding, found, is_start_up, steady_stress, stress_noise
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
 from discover.dataset.mode_search import BEYOND, relative_moduli, solved
-from discover.dataset.run import LARGEST, Run
+from discover.dataset.run import Run
 from discover.statistics import HALF_BAND
-from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 
 # A sweep begins where the fluid is linear; above this amplitude no edge stays whole for many cycles
@@ -25,16 +23,8 @@ _POINTS_PER_MODE = 1.5  # modes enough for any sweep of so many points; more wou
 _LINEAR_STRAIN = 0.2
 # What gap, loading and temperature leave open between two instruments' stresses
 _STRESS_TOLERANCE = 0.15
-# What they leave open where nothing is wrong with either: 1 % of the radius of the filling is 3 %
-# of the torque, 1 K some 3 % of a melt's viscosity, 10 µm some 1 % of a gap
-_SHARED_TOLERANCE = 0.07
-# Less than 1 % of the radius is worth no word; between the two a gain is noted and not doubted
-_NOTED_GAIN = 0.03
-# Of a gain: samples of a run, change of the ratio within it, and runs whose scatter is known
-_FEWEST_RATIOS, _STEADY_RATIO, _FEWEST_GAINS = 5, 0.05, 3
+_FEWEST_RATIOS = 5  # samples of a run
 _CLEAR_OF_ZERO = 0.3  # where the stress passes through zero its ratio says nothing
-# Of gains that differ: what a law that thins leaves of linear theory at small strain, and chance
-_STILL_LINEAR, _UNLIKELY = 0.01, 1e-3
 # Units that are taken for others, and what then makes the numbers right
 _MISTAKEN: dict[str, dict[str, float]] = {
     "a stress in kPa that is read in Pa": {"stress": 1e3},
@@ -134,11 +124,7 @@ class SweepInertia(NamedTuple):
 
 
 def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
-    """Return how much of G′, as recorded, is inertia, with Maxwell modes, solvent and constant.
-
-    The torque on tool and sample is G* − I ω² times the strain   [Krieger 1990, J. Rheol. 34, 471].
-    Positive moduli only rise in G′, so a G′ that falls with ω² is no material's.
-    """
+    """Return how much of G′ is inertia: the torque is G* − I ω² times strain [Krieger 1990]."""
     omega = np.asarray(sweep.angular_frequency, dtype=float)
     size = np.hypot(sweep.storage_modulus, sweep.loss_modulus)
     data = np.concatenate([sweep.storage_modulus / size, sweep.loss_modulus / size])
@@ -173,14 +159,16 @@ def against_linear_theory(
     number = fastest * mean_time
     if runs and not spectrum.elastic_modulus and number < 0.1:
         yield found("all_linear", time=mean_time, number=number)
-    linear = {run.name: _linear_part(run, sweep, spectrum) for run in runs if run.flows}
     if units := _mistaken_units([run for run in runs if run.flows], sweep, spectrum):
         yield found("mistaken_unit", SWEEP_FILE, units=" or ".join(units))
         return
-    yield from _shared_gain(runs, linear, sweep, spectrum)
-    for run in runs:
+    for run in (run for run in runs if run.flows):
+        stress, predicted = _linear_part(run, sweep, spectrum)
+        ratio = float(np.median(stress / predicted)) if len(stress) >= _FEWEST_RATIOS else 1.0
+        if abs(ratio - 1.0) > _STRESS_TOLERANCE:
+            yield found("off_linear_theory", run.name, strain=_LINEAR_STRAIN, factor=ratio)
         if is_start_up(run):
-            yield from _of_start_up(run, *linear[run.name], sweep, mean_time)
+            yield from _of_start_up(run, sweep, mean_time)
 
 
 def _mistaken_units(
@@ -198,16 +186,11 @@ def _mistaken_units(
     return [unit for unit, factors in _MISTAKEN.items() if agreement(**factors) >= _AGREE]
 
 
-def _of_start_up(
-    run: Run, stress: Values, linear: Values, sweep: LinearSweep, mean_time: float
-) -> Iterator[Finding]:
+def _of_start_up(run: Run, sweep: LinearSweep, mean_time: float) -> Iterator[Finding]:
     rate, frequency = abs(run.rate[0]), sweep.angular_frequency
     # strongly sheared melts are steady after some strain, however slow they relax
     if run.time[-1] < mean_time and (strain := rate * run.time[-1]) < 5.0:
         yield found("too_short", run.name, lasts=run.time[-1], strain=strain, time=mean_time)
-    ratio = float(np.median(stress / linear)) if len(stress) >= _FEWEST_RATIOS else 1.0
-    if abs(ratio - 1.0) > _STRESS_TOLERANCE:
-        yield found("off_linear_theory", run.name, strain=_LINEAR_STRAIN, factor=ratio)
     level = steady_stress(run)
     inside = frequency[0] <= rate <= frequency[-1]
     if rate * mean_time <= _COX_MERZ_RATE and level is not None and inside:
@@ -248,62 +231,3 @@ def _linear_part(
     # times shorter than those of the sweep are extrapolation
     use &= times[1 : n + 1] > 1.0 / np.max(sweep.angular_frequency)
     return stress * run.stress[:n][use], linear[use]
-
-
-def _gain(run: Run, stress: Values, linear: Values) -> tuple[float, float] | None:
-    """Log of a run's gain against the sweep, and its error; None if it drifts or leaves more."""
-    if len(stress) < _FEWEST_RATIOS or np.any(stress * linear <= 0):
-        return None
-    ratios = np.log(stress / linear)
-    gain, half = float(np.median(ratios)), len(ratios) // 2
-    drift = abs(float(np.median(ratios[half:]) - np.median(ratios[:half])))
-    left = rms(stress - np.exp(gain) * linear)
-    if drift > _STEADY_RATIO or left > max(_STEADY_RATIO * rms(stress), 2.0 * stress_noise(run)):
-        return None
-    # lines between samples lose (ωh)²/12 of a wave; what they miss in the middle is (ωh)²/2
-    coarse = rms(np.diff(run.rate, 2)) / rms(run.rate) / 6.0
-    # a median's error is 1.25 times a mean's; the fewest samples hardly show how they scatter
-    known = max(len(ratios) - _FEWEST_RATIOS, 1)
-    of_median = 1.25 * float(np.std(ratios)) / np.sqrt(known)
-    return gain, max(drift, of_median, coarse)
-
-
-def _shared_gain(
-    runs: Sequence[Run],
-    linear: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    sweep: LinearSweep,
-    spectrum: RelaxationSpectrum,
-) -> Iterator[Finding]:
-    """Yield by which factor all runs differ from the sweep, if it is one for all."""
-    flowing = [run for run in runs if run.name in linear]
-    found_gains = [gain for run in flowing if (gain := _gain(run, *linear[run.name])) is not None]
-    if not found_gains:
-        return
-    gains, errors = np.array(found_gains).T
-    count, several = len(gains), len(gains) >= _FEWEST_GAINS
-    if several:
-        yield from _unlike_gains(gains, np.hypot(errors, _STILL_LINEAR))
-    shared = float(np.median(gains))
-    scatter = 1.4826 * float(np.median(np.abs(gains - shared))) / np.sqrt(count)
-    warned = abs(shared) >= np.log1p(_SHARED_TOLERANCE)
-    if warned and several:
-        doubt = max(scatter, spectrum.best_error / np.sqrt(len(sweep.angular_frequency)))
-    else:
-        # so few do not show how they scatter: each answers for itself, and for the sweep's misfit
-        doubt = max(scatter, float(np.max(errors)), spectrum.relative_error)
-    if abs(shared) < 3.0 * doubt or np.min(gains) < 0 < np.max(gains):
-        return
-    if warned or (abs(shared) >= np.log1p(_NOTED_GAIN) and several):
-        few = {1: "the one run that tells", 2: "both runs that tell"}
-        which = few.get(count, f"all {count} runs that tell")
-        yield found("gain" if warned else "small_gain", runs=which, factor=np.exp(shared))
-
-
-def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
-    weights = errors**-2.0
-    off = (gains - np.sum(weights * gains) / np.sum(weights)) / errors
-    spread = float(np.sqrt(max(np.var(gains, ddof=1) - np.mean(errors**2), 0.0)))
-    if chdtrc(len(gains) - 1, float(off @ off)) > _UNLIKELY or spread > LARGEST:
-        return
-    ends = {"low": np.exp(np.min(gains)), "high": np.exp(np.max(gains))}
-    yield found("loadings", **ends, percent=percent_of(spread), spread=spread)

@@ -36,8 +36,7 @@ Values = Float[np.ndarray, " n"]
 class Finding:
     """One thing that is wrong, doubtful or worth knowing.
 
-    An ``error``: the folder cannot be used; a ``warning``: it can, but results may mislead; a
-    ``note``: how something was understood.
+    An ``error``: the folder cannot be used; a ``warning``: results may mislead.
     """
 
     severity: Severity

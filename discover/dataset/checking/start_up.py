@@ -108,9 +108,9 @@ def _averaged(values: Values, width: int) -> Float[np.ndarray, " _"]:
 def _early(run: Run, normal: Values) -> _Fault | None:
     """Hold N1 against what elasticity allows in start-up from rest.
 
-    With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
-    only lowers it. At small strain N1 = 2 γ̇² ∫ s G(s) ds and σ12 = γ̇ ∫ G(s) ds (Bird, Armstrong &
-    Hassager 1987, vol. 1, ch. 6), so that N1 = 2 γ̇ (t σ12 − ∫ σ12 dt) whatever G and solvent.
+    With every mode elastic N1 = σ12 γ [Lodge & Meissner 1972, Rheol. Acta 11, 351], less with
+    relaxation. At small strain N1 = 2 γ̇ (t σ12 − ∫ σ12 dt) whatever G and solvent [Bird, Armstrong
+    & Hassager 1987, vol. 1, ch. 6].
     """
     rate = abs(float(run.rate[0]))
     strain, stress = rate * run.time, run.stress * np.sign(run.rate[0])
@@ -168,9 +168,8 @@ def doubts_of_start(
 ) -> Iterator[Finding]:
     """Yield why a run that is taken as starting from rest cannot have started so, or does not show.
 
-    A first stress is doubted that is large and (1) falls whatever the rate does; or (2) belongs to
-    an elastic fluid's oscillation whose first cycle is like the later ones; or (3) is more than a
-    linear sweep allows; or (4) comes with a strain that the rate had not made by then.
+    A large first stress is doubted that (1) falls whatever the rate does; (2) belongs to an elastic
+    fluid's steady oscillation; (3) is more than a sweep allows; (4) has a strain not of the rate.
     """
     size, first = float(np.max(np.abs(run.stress))), abs(float(run.stress[0]))
     of_rest = run.protocol.control == "rate" and run.from_rest and len(run) > 4

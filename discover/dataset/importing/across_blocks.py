@@ -1,8 +1,4 @@
-"""Tests that are more or less than a block: intervals one after the other, waves beside a sweep.
-
-Intervals of a thixotropy test are one: what a structured fluid does in one depends on those before
-it   [Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214].
-"""
+"""Tests that are more or less than a block: intervals of one test [Mewis & Wagner 2009], waves."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,8 +21,8 @@ _SAME_STRESS = 0.1  # over the stress: an interval repeats another, and starts a
 def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) -> list[Numbered]:
     """Return numbered blocks of a file, those that are intervals of one thixotropy test as one.
 
-    Words say that they are, or three rates of which the last is the first again, or rates that go
-    up and then down with stresses that differ.
+    By words, three rates of which the last is the first, or rates up and down that differ in
+    stress.
     """
     left, found = list(blocks), []
     while left:
@@ -120,8 +116,7 @@ _FEWEST_OF_WAVE = 32
 def waves_of(readings: Readings) -> Iterator[Block]:
     """Yield the waveforms that stand beside the summary of an oscillation, a block for each point.
 
-    Without a time the samples are whole cycles at the frequency of the point, closed with the first
-    sample, and the rate is the derivative of the Fourier series, without harmonics that are noise.
+    Without a time samples are whole cycles, and the rate is the Fourier series' derivative.
     """
     strain, stress = readings.alone("strain_wave"), readings.alone("stress_wave")
     if strain is None or stress is None:

@@ -161,8 +161,7 @@ def register_importer(
     Parameters
     ----------
     name, suffixes
-        As ``--format`` is to spell it: lower-case letters, digits and underscores; endings of names
-        by which such files are known.
+        As ``--format`` is to spell it, in small letters; endings by which such files are known.
     read
         Takes the path of a file and returns its blocks, made with `Block.of`.
 

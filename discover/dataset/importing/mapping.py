@@ -27,11 +27,11 @@ Celsius = Annotated[float, Field(ge=ABSOLUTE_ZERO, le=2000)]  # a temperature th
 
 
 class Geometry(Section):
-    """The tool, needed where the file holds torque, angle or force instead of stress and strain.
+    """The tool, needed where the file holds torque, angle or force.
 
-    Cone and plate: σ12 = 3M/(2πR³), γ = θ/β, N1 = 2F/(πR²). Plates: σ12 = 2M/(πR³), γ = θR/h at the
-    rim   [Macosko 1994, Rheology, ch. 5]. The stress of plates is the apparent one: it is the
-    stress at the rim only for a linear fluid, and the force gives N1 − N2, so it is not read.
+    Cone and plate: σ12 = 3M/(2πR³), γ = θ/β, N1 = 2F/(πR²). Plates: σ12 = 2M/(πR³), the apparent
+    one, γ = θR/h at the rim [Macosko 1994, Rheology, ch. 5]; the force gives N1 − N2 and is not
+    read.
     """
 
     type: Literal["cone_plate", "plate_plate"]
@@ -77,11 +77,7 @@ class Source(Section):
 
 
 class Mapping(Section):
-    """Everything that decides an import; written beside the result so that it can be repeated.
-
-    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`, of `temperatures`, in °C,
-    ``FILE:BLOCK`` or ``FILE``.
-    """
+    """Everything that decides an import; `tests` and `temperatures` (°C) by file and block."""
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)

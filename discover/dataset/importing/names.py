@@ -1,7 +1,4 @@
-"""What exports call each quantity, in many languages, compared word by word.
-
-Capitals, accents, separators and spelled Greek letters make no difference.
-"""
+"""What exports call each quantity, in many languages, compared word by word, however written."""
 
 import re
 import tomllib

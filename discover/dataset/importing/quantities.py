@@ -46,10 +46,7 @@ _SHORT = 3  # letters of a name that says too little without its unit
 
 
 def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
-    """Return the place of each quantity among the columns of a block that hold a number.
-
-    `given`: names that the user gave; they win. Raises InputError if one stands above two columns.
-    """
+    """Return the place of each quantity, `given` names first; InputError if one is there twice."""
     names = [name for name, _ in block.columns]
     found: dict[str, int] = {}
     for key in QUANTITIES:

@@ -1,8 +1,4 @@
-"""The tests of one file: side by side in a table, one below the other, row by row in turn.
-
-What repeats tells them apart: a word or number in a column of its own, a temperature, a set value,
-a clock or a series of rates that starts again.
-"""
+"""The tests of one file: side by side in a table, one below the other, row by row in turn."""
 
 import re
 from collections import Counter
@@ -139,10 +135,7 @@ def _is_condition(label: str) -> bool:
 
 
 def _constant(label: str, known: set[str]) -> Constant | None:
-    """Return what stands above or beside names as the condition of a test, if it is one.
-
-    A number alone is what the columns lack: the rate of stresses over time, or the temperature.
-    """
+    """Condition of a test above or beside names; a bare number is what the columns lack."""
     found = _LABEL.fullmatch(label.strip("()[]@ "))
     if found is None or label.startswith("no. "):
         return None

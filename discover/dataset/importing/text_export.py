@@ -1,9 +1,7 @@
 """Blocks of numbers in a table of cells, with the names, the units and the words above them.
 
-One reader serves plain tables, TRIOS (text, CSV, "Export to LIMS" and spreadsheets; blocks headed
-``[step]``), RheoCompass (``Interval data:``), rSpace and RheoWin: all are a line of names, perhaps
-a line of units, then lines of numbers, some of which begin with a word. hermes-rheo 2.0.0 reads
-TRIOS' four lines alone, and pins older scipy, pandas and matplotlib.
+Plain tables, TRIOS (``[step]``), RheoCompass (``Interval data:``), rSpace and RheoWin all are a
+line of names, perhaps of units, then lines of numbers, some of which begin with a word.
 """
 
 import re
@@ -64,11 +62,7 @@ class Block:
 
     @classmethod
     def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
-        """Return columns of numbers as a block, as if a file had held them as text.
-
-        `columns`: unit, empty for a pure number, and values of each by its name, all of one shape
-        (n,); nan is an empty cell. Raises InputError if they are none.
-        """
+        """Return columns, unit and values (n,) by name, as a block; InputError if they are none."""
         values = [np.asarray(numbers, dtype=float) for _, numbers in columns.values()]
         if not values or {one.shape for one in values} != {(values[0].size,)}:
             shapes = ", ".join(f"{n}: {v.shape}" for n, v in zip(columns, values, strict=True))
@@ -117,10 +111,7 @@ def require_blocks(blocks: list[Block], name: str) -> list[Block]:
 
 
 def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
-    """Return the blocks of numbers among the cells of each line, with decimal points.
-
-    `header_row`: line of the names, where it is not that above the numbers; then one block.
-    """
+    """Return blocks of numbers among cells of lines; one below `header_row`, the line of names."""
     blocks: list[Block] = []
     header: _Columns | None = None
     over: tuple[str, ...] = ()

@@ -38,10 +38,7 @@ def is_clock(cell: str) -> bool:
 
 
 def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
-    """Return readings of a clock in s, nan where a cell is none; past midnight they go on.
-
-    Clocks of the day and time stamps count from the first. `unit`: as written, such as ``hh:mm``.
-    """
+    """Return readings of a clock in s, counted on past midnight; `unit` such as ``hh:mm``."""
     matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
     # is the first of May
@@ -101,10 +98,7 @@ def read_rows(
     decimal: Decimal | None = None,
     encoding: str | None = None,
 ) -> list[list[str]]:
-    """Return the cells of every line of a text file, numbers with decimal points.
-
-    Raises InputError if it cannot be read, or a decimal comma may be of thousands.
-    """
+    """Cells of the lines of a text file; InputError if unreadable, or a comma is ambiguous."""
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()
     mark = DELIMITERS[delimiter] if delimiter else _delimiter(lines)

@@ -1,8 +1,4 @@
-"""Which test a block of numbers is, by words and by numbers, before any of it is used.
-
-What words say is believed first; where numbers exclude it nothing is taken. Numbers tell what was
-imposed by its course: a command is held, in steps or not, or goes straight; an answer does neither.
-"""
+"""Which test a block of numbers is: by words, and by the course of its numbers where silent."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -69,10 +65,7 @@ class Said(NamedTuple):
 
 
 def said_of(block: Block, file: str) -> Said | None:
-    """Return which test the words nearest to a block name; None if they name none, or several.
-
-    The name of its step comes first, then the lines above it, the nearest first, then the file's.
-    """
+    """Test that the words nearest to a block name: step, lines above, file; None if several."""
     for words in (block.name, *_titles(block.above)):
         if (test := _named(words)) is not None:
             return Said(test, words)

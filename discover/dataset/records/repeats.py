@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.records.thinning import nearest
 from discover.dataset.run import LARGEST, Run
 from discover.errors import InputError
 from discover.protocols.kinematics import STATES
@@ -27,11 +28,7 @@ _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_se
 
 
 def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
-    """Return the names of the runs of each test that was repeated.
-
-    Two runs are one test if their rates agree, and every number that the source gives of their
-    conditions, over the longer run, or over the time that both cover if that is half of it.
-    """
+    """Return the names of the runs of each test repeated: rates and all conditions agree."""
     groups: list[list[Run]] = []
     for run in runs:
         if run.protocol.control in (*STATES, "stress") or len(run) < _FEWEST_SAMPLES:
@@ -102,10 +99,7 @@ def is_copy(one: Run, other: Run) -> bool:
     if len(fewer) < _FEWEST:
         same = np.array_equal(one.time, other.time)
         return same and np.array_equal(one.recorded, other.recorded)
-    at = np.clip(np.searchsorted(more.time, fewer.time), 0, len(more) - 1)
-    at = np.where(
-        np.abs(more.time[at - 1] - fewer.time) < np.abs(more.time[at] - fewer.time), at - 1, at
-    )
+    at = nearest(more.time, fewer.time)
     close = np.abs(more.time[at] - fewer.time) <= 1e-6 * max(float(fewer.time[-1]), 1e-300)
     if np.mean(close) < 0.9 or np.count_nonzero(close) < _FEWEST:
         return False
@@ -117,10 +111,7 @@ def is_copy(one: Run, other: Run) -> bool:
 
 
 def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
-    """Refuse to test on a record that is fitted under another name; InputError names both.
-
-    Among fitted runs a copy makes intervals a little too narrow: a check of the folder warns of it.
-    """
+    """Refuse to test on a record that is fitted under another name; InputError names both."""
     for run in held_out:
         copied = next((other.name for other in fitted if is_copy(run, other)), None)
         if copied is not None:
@@ -155,10 +146,7 @@ def total_strain(run: Run) -> float:
 
 
 def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
-    """Return the runs with the strain that their sample had seen in earlier ones.
-
-    Runs of equal number in the `order`, such as start times, are parallel.
-    """
+    """Return runs with the strain of those before in `order`, such as start times."""
     totals = np.array([total_strain(run) for run in runs])
     return tuple(
         replace(run, strain_before=float(np.sum(totals[order < at])))

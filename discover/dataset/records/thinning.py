@@ -25,17 +25,14 @@ def thin(
     shear_rate: Float[np.ndarray, " n"],
     shear_stress: Float[np.ndarray, " n"],
 ) -> tuple[Bool[np.ndarray, " n"], str]:
-    """Return which samples of more than `MOST_SAMPLES` to keep, and a word on what was kept.
-
-    Half are even in log time, where a start-up has its information, half in time, where cycles do.
-    """
+    """Return which samples to keep, half even in log time, half in time, and a word on it."""
     n = len(time)
     keep = np.zeros(n, dtype=bool)
     keep[[0, -1]] = True
     half = (MOST_SAMPLES - 6) // 2
     positive = time[time > 0]
-    keep[_nearest(time, np.geomspace(positive[0], positive[-1], half))] = True
-    keep[_nearest(time, np.linspace(time[0], time[-1], half))] = True
+    keep[nearest(time, np.geomspace(positive[0], positive[-1], half))] = True
+    keep[nearest(time, np.linspace(time[0], time[-1], half))] = True
     for values in (shear_stress, shear_rate):
         keep[[int(np.argmin(values)), int(np.argmax(values))]] = True
     return keep, (
@@ -52,10 +49,7 @@ def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
 
 
 def thin_run(run: Run, most: int) -> Run:
-    """Return a run with at most so many of its samples, 2 or more, evenly chosen in their order.
-
-    A rate that was read sample by sample is followed as well as `followed_rate` does.
-    """
+    """Thin a run evenly to so many samples, 2 or more; its rate is a `followed_rate`."""
     n = len(run)
     if n <= most:
         return run
@@ -77,11 +71,7 @@ def thin_run(run: Run, most: int) -> Run:
 def followed_rate(
     time: Float[np.ndarray, " n"], shear_rate: Float[np.ndarray, " n"], keep: Bool[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return times and rates of fewer knots, whose straight lines follow a rate read in samples.
-
-    A spline by least squares has knots at the samples to `keep` and more, until the strain is right
-    to 0.1 % of its range and the rate to 5 % of its largest.
-    """
+    """Return fewer knots that follow a rate: 0.1 % of the strain, 5 % of the largest rate."""
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)
     most = _FOLLOWED * np.ptp(strain), _FOLLOWED_RATE * np.max(np.abs(shear_rate))
@@ -107,9 +97,9 @@ def followed_rate(
     return time, shear_rate
 
 
-def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    return after - (wanted - time[after - 1] < time[after] - wanted)
+def nearest(time: Float[np.ndarray, " n"], wanted: np.ndarray) -> np.ndarray:
+    """Return the places of the times, increasing, that are nearest to those wanted."""
+    return np.searchsorted(0.5 * (time[1:] + time[:-1]), wanted)
 
 
 # The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4
@@ -123,10 +113,7 @@ def bends(place: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> np
 
 
 def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
-    """Return which samples are next to a step or corner of rate or stress, whichever was imposed.
-
-    What is answered there may stand alone without a knock.
-    """
+    """Which samples are next to a step or corner of rate or stress, whichever was imposed."""
     imposed = run.stress if run.protocol.control == "stress" else run.rate
     beside = np.zeros(len(imposed), dtype=bool)
     if len(imposed) < 3:
@@ -147,10 +134,7 @@ def without_spikes(run: Run) -> tuple[Run, list[float]]:
 
 
 def without_held_values(run: Run) -> Run:
-    """Return a run with the first sample of each value, where samples hold values read before.
-
-    A value read again is late: fitted, it is a lag, and a noise with neighbours alike.
-    """
+    """Keep the first sample of each value that is held: one read again fits as a lag."""
     times = read_times(run.recorded)
     if times == 1:
         return run

@@ -144,10 +144,7 @@ def read_bytes(
     path: Path, name: str, if_missing: str = "Check its path.", largest: int = LARGEST_FILE,
     too_large: str = "Keep fewer samples of it.", is_input: bool = True,
 ) -> bytes:  # fmt: skip
-    """Return the content of a regular file of reasonable size; InputError if it is none.
-
-    `largest` in bytes. `is_input`: whether a command that reads it must not write over it.
-    """
+    """Content of a regular file of at most `largest` bytes; InputError if it is none."""
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
         with open(path, "rb", opener=lambda p, flags: os.open(p, flags | _AT_ONCE)) as file:
@@ -205,11 +202,7 @@ def did_you_mean_file(path: Path) -> str:
 
 
 def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:
-    """Return a CSV file with a header line as text; InputError if it is missing, empty or none.
-
-    Other separators, decimal commas and other encodings are recognised and refused, since guessing
-    at numbers is no help.
-    """
+    """CSV file with a header line as text; InputError if missing, empty, or no UTF-8 CSV."""
     name = path.name if name is None else name
     text = _decode(read_bytes(path, name, if_missing), name)
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
@@ -363,10 +356,7 @@ _MOST_DOTS = 5000  # of a line: the library's time grows with the square of the 
 
 
 def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]:
-    """Return the content and the text of a TOML file; InputError says on which line it is none.
-
-    `kind`: what it should be, such as "study file". `example`: the remedy, as a sentence.
-    """
+    """Content and text of a TOML file of a `kind`; InputError says where, and `example`."""
     raw = read_bytes(
         path, str(path), f"Check the path of the {kind}.", largest=LARGEST_TEXT, too_large=example
     )

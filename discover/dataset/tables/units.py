@@ -55,11 +55,7 @@ def read_heading(suffix: str) -> Unit | None:
 
 @cache
 def read_unit(text: str) -> Unit | None:
-    """Return a unit as exports write it, or None if it is none.
-
-    Products are written with ``.``, ``*``, ``·`` or a space, exponents as ``cm2``, ``s-1``,
-    ``s^-1``, ``s**-1`` or ``s⁻¹``. Empty, ``-`` and ``1`` mean a pure number.
-    """
+    """Return a unit as exports write it (``cm2``, ``s^-1``, ``Pa·s``), or None if it is none."""
     text = tidy_unit(text)
     if text in ("", "-", "--", "1"):
         return Unit()

@@ -1,15 +1,12 @@
-"""Laws as Python text with numpy or SymPy alone.
-
-Made of tables and of `repr` of numbers; names of files or studies occur in comments only. ``@`` and
-``trace()`` serve numpy and SymPy alike; UFL changes a few entries.
-"""
+"""Laws as Python text with numpy or SymPy alone, of tables and `repr` of numbers; base of UFL."""
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from importlib import import_module
 from typing import Any
 
 from discover.equations.equation import Equation
-from discover.equations.formats.latex_file import header_lines
 from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
@@ -36,28 +33,27 @@ class CodeNotation(Notation):
         text, _ = printed(expression, letters, self._text)
         return f"({text})" if factor else text
 
+    printer = "numpy.NumPyPrinter"  # of `sympy.printing`
+    largest = "max({}, {})"  # of two numbers, not of arrays
+    written = (r"numpy\.", "np.")  # how the printer names a module, and how the text does
+
     def _text(self, expression: Any) -> str:
-        from sympy.printing.numpy import NumPyPrinter
+        module, _, name = self.printer.partition(".")
+        base = getattr(import_module(f"sympy.printing.{module}"), name)
+        largest = self.largest.format
 
-        class Printer(NumPyPrinter):
-            def _print_Max(self, expr: Any) -> str:  # of numbers, not of arrays
-                return f"max({', '.join(map(self._print, expr.args))})"
+        class Printer(base):
+            def _print_Max(self, expr: Any) -> str:
+                return reduce(largest, map(self._print, expr.args))
 
-        return str(Printer().doprint(expression)).replace("numpy.", "np.")
+        return re.sub(self.written[0], self.written[1], Printer().doprint(expression))
 
 
 class _SympyCodeNotation(CodeNotation):
     exponential_form = "(sympy.exp({rate} * {trace}) - 1)"
     saturating_form = "({trace} / (1 + {level} * sympy.Abs({trace})))"
-
-    def _text(self, expression: Any) -> str:
-        from sympy.printing.pycode import SymPyPrinter
-
-        class Printer(SymPyPrinter):
-            def _print_Max(self, expr: Any) -> str:
-                return f"sympy.Max({', '.join(map(self._print, expr.args))})"
-
-        return re.sub(r"sympy\.functions(\.\w+)+\.", "sympy.", str(Printer().doprint(expression)))
+    printer, largest = "pycode.SymPyPrinter", "sympy.Max({}, {})"
+    written = (r"sympy\.functions(\.\w+)+\.", "sympy.")
 
 
 # Lines of templates that begin so are for laws with a name, structure variables or states alone
@@ -277,11 +273,7 @@ def filled(
     template: str, equation: Equation, notation: CodeNotation, nothing: str,
     constants: str | None = None, indent: str = "    ",
 ) -> str:  # fmt: skip
-    """Return a module: a template with the law in a notation.
-
-    `constants`: of a named law, as text; by default a list with a table for each mode.
-    `indent`: of what stands in functions; empty where nothing does.
-    """
+    """Fill a template with the law; `constants` of a named law as text, by default a table."""
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
     lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]
@@ -307,7 +299,7 @@ def filled(
     ]
     last = 9 + len(variables)
     return "".join(kept).format(
-        header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
+        header="\n".join(equation.header) or "Where it was tested is not recorded.",
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes=repr([(float(g), float(time)) for g, time in pairs]),

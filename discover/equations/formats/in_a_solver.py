@@ -57,10 +57,8 @@ class _Spent(Exception):
 def in_a_solver(equation: Equation) -> InASolver | str | None:
     """Return how a law behaves at the edge of the box in which it was learned.
 
-    A sentence where that takes too long; None without a box, or with a state of the whole fluid.
-    Each mode goes through start-up at the largest Wi, and oscillation at it and the least and
-    largest De. A step is stable where |1 + Δt μ| ≤ 1 for every decaying eigenvalue μ of the
-    linearised stress equation.
+    A sentence where that takes too long; None without a box, or with a state. A step is stable
+    where |1 + Δt μ| ≤ 1 for every decaying eigenvalue μ of the linearised stress equation.
     """
     if equation.tested is None or equation.states:
         return None

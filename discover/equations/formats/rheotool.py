@@ -1,10 +1,8 @@
 """Laws as rheoTool's ``constant/constitutiveProperties``, where rheoTool knows the law.
 
-Names and equations are those of its library ``constitutiveEquations``, tree ``of90`` [Pimenta &
-Alves 2017, JNNFM 239, 85; github.com/fppimenta/rheoTool]. Its PTT carries the slip ζ of Johnson &
-Segalman, ½ζ(τ·γ̇ + γ̇·τ), so that law is PTT with ε = 0. Its FENE-P relaxes the conformation by (f
-A − a I)/λ with a = L²/(L² − 3): in this package's stress form a relaxation time λ/a at the same
-viscosity.
+Of ``constitutiveEquations``, tree ``of90`` [Pimenta & Alves 2017, JNNFM 239, 85]. Its PTT has the
+slip ζ of Johnson & Segalman, which is PTT with ε = 0. Its FENE-P relaxes by (f A − a I)/λ with a =
+L²/(L² − 3): here a time λ/a at the same viscosity.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from discover.equations.equation import Equation
-from discover.equations.formats.latex_file import header_lines
 from discover.equations.parts import EXPONENTIAL, combined
 from discover.errors import InputError
 from discover.laws.textbook.classical import fene_p_terms
@@ -78,10 +75,7 @@ OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mapping
 
 
 def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoToolModel:
-    """Return the law in rheoTool's words; ``sigma`` and ``gammadot`` change time and modulus.
-
-    Raises InputError if rheoTool has no such law, naming the term in the way.
-    """
+    """Law in rheoTool's words; InputError, naming the term in the way, if rheoTool has none."""
     if equation.named is not None:
         below = equation.named.built().as_terms()
         if below is None:
@@ -160,7 +154,7 @@ def rheotool_text(
             lines += [f"    M{k + 1}", "    {", *(f"        {line}" for line in entries), "    }"]
     if len(modes) > 1:
         lines = ["type             multiMode;", "", "models", "(", *lines, ");"]
-    return properties_file([*header_lines(equation), *notes], lines, density_kg_m3)
+    return properties_file([*equation.header, *notes], lines, density_kg_m3)
 
 
 def viscous_fluid(
@@ -169,10 +163,7 @@ def viscous_fluid(
     comments: Sequence[str],
     density_kg_m3: float = DENSITY,
 ) -> str:
-    """Return the file of a fluid without elasticity.
-
-    `kind`: rheoTool's type. `entries`: by name, a quantity of `QUANTITIES` and its value.
-    """
+    """File of a `kind` of fluid without elasticity; `entries`: of `QUANTITIES`, and value."""
     density = {"rho": ("density", density_kg_m3)}
     lines = [f"{'type':<17}{kind};"]
     for name, (quantity, value) in (density | dict(entries)).items():

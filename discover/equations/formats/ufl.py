@@ -1,7 +1,5 @@
 """Laws as UFL, the language of weak forms that FEniCSx reads."""
 
-from typing import Any
-
 from discover.equations.equation import Equation
 from discover.equations.formats.code import CodeNotation, filled
 
@@ -95,6 +93,8 @@ def in_space(plane):
 
 class _UflNotation(CodeNotation):
     exponential_form = "(exp({rate} * {trace}) - 1)"
+    printer, largest = "pycode.PythonCodePrinter", "max_value({}, {})"
+    written = (r"math\.", "ufl.")
 
     def contraction(self, tensors):
         first, *others = tensors
@@ -102,18 +102,6 @@ class _UflNotation(CodeNotation):
 
     def trace(self, tensor: str) -> str:
         return f"tr({tensor})"
-
-    def _text(self, expression: Any) -> str:
-        from sympy.printing.pycode import PythonCodePrinter
-
-        class Printer(PythonCodePrinter):
-            def _print_Max(self, expr: Any) -> str:
-                first, *others = map(self._print, expr.args)
-                for other in others:
-                    first = f"max_value({first}, {other})"
-                return first
-
-        return str(Printer().doprint(expression)).replace("math.", "ufl.")
 
 
 def ufl_code(equation: Equation) -> str:

@@ -27,10 +27,7 @@ def law_latex(
     digits: int = 5,
     named: NamedPart | None = None,
 ) -> str:
-    """Return a dimensionless law as one LaTeX equation.
-
-    `linear_relaxation`: whether the −σ is there. `named`: a law to whose h the terms are added.
-    """
+    """Dimensionless law, `named` plus terms, as one LaTeX equation, with −σ or without."""
     sums, defined = _law(terms, linear_relaxation, LatexNotation(digits), named)
     return SEPARATOR.join([" ".join(sums), *defined])
 
@@ -39,9 +36,9 @@ def _law(
     terms: Sequence[LawTerm], linear_relaxation: bool, notation: LatexNotation,
     named: NamedPart | None, time: str = "", rest: bool = False,
 ) -> tuple[list[str], list[str]]:  # fmt: skip
-    """Return a law in pieces between which a line may break, and what its letters are.
+    """Law in pieces between which a line may break, and what its letters are.
 
-    `time`: before the derivative. `rest`: whether it has a summand h that stands elsewhere.
+    `time`: before the derivative. `rest`: whether a summand h stands elsewhere.
     """
     stress = notation.tensor("sigma")
     # all on the left, so that each term has the sign that tables and files give it
@@ -91,11 +88,7 @@ def latex_letters(named: NamedPart, notation: LatexNotation) -> dict[str, str]:
 
 
 class DisplayedNotation(LatexNotation):
-    """LaTeX of what pages show, four digits.
-
-    `modes`: how many a law in Pa and s has, written for each: τ for σ/G, and λ before γ̇, with index
-    k of several; 0 for a dimensionless law.
-    """
+    """LaTeX of what pages show, four digits; with `modes` in Pa and s: τ for σ/G, λ before γ̇."""
 
     # the combining dot sits well in every font, an accent over a letter only in mathematical ones
     tensors = {**LatexNotation.tensors, "gammadot": r"\textbf{γ̇}"}  # noqa: RUF012
@@ -155,8 +148,7 @@ def law_element(
 ) -> str:  # fmt: skip
     """Return the whole law, displayed; each summand is a `math` element, so that lines break.
 
-    `modes`: how many a law in Pa and s has; 0 for a dimensionless one. `solvent`: whether that has
-    one. `rest`: whether it has a summand h that stands elsewhere.
+    `modes`: of a law in Pa and s; 0: dimensionless. `rest`: whether a summand h stands elsewhere.
     """
     notation = DisplayedNotation(modes)
     pieces, defined = _law(terms, linear_relaxation, notation, named, notation.time, rest)
@@ -175,10 +167,7 @@ def law_element(
 
 
 def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> "sympy.Expr":
-    """Return h over the non-commuting tensors of `tensor_library.sympy_notation`.
-
-    Constants that differ from mode to mode, and structure variables, stay letters.
-    """
+    """Return h over non-commuting tensors; constants by mode, and variables, stay letters."""
     import sympy
 
     from tensor_library.sympy_notation import SympyNotation

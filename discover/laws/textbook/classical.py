@@ -1,4 +1,4 @@
-"""The classical laws: Maxwell, Johnson–Segalman, Giesekus, affine Phan-Thien–Tanner, FENE-P."""
+"""Laws of one tensor: Maxwell's, and those that add to it or scale its relaxation."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -122,10 +122,7 @@ class FenePeterlin(AbstractConstitutiveLaw):
 def fene_p(
     inverse: Float[Array, ""], rest: Float[Array, ""], stress: Symmetric, rate: Symmetric
 ) -> Symmetric:
-    """Return h of FENE-P: q tr(σ) σ − q (tr(σ·γ̇) − f tr σ)(σ + I)/(1 − 3q).
-
-    `inverse`: q = 1/L². `rest`: 1 − 3q, by itself, for it may be small.
-    """
+    """Return h of FENE-P with `inverse` q = 1/L² and `rest` 1 − 3q, which may be small."""
     stretch = trace(stress)
     factor = 1.0 + inverse * stretch
     growth = inverse * (inner(stress, rate) - factor * stretch) / rest
@@ -167,6 +164,53 @@ class NonAffine(AbstractConstitutiveLaw):
         slip = LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
         affine = self.affine.as_terms()
         return None if affine is None else (*affine, slip)
+
+
+class Saramito(AbstractConstitutiveLaw):
+    """Elastoviscoplastic law h = −min(1, Y/|σ_d|) σ   [Saramito 2007, JNNFM 145, 1].
+
+    |σ_d|² = ½ σ_d:σ_d of the deviator σ_d; Y is the yield stress over the modulus.
+    """
+
+    yield_strain: Float[Array, ""] = eqx.field(converter=as_parameter)  # Y
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        del rate
+        deviator = stress - trace(stress) / 3.0 * identity_like(stress)
+        squared = 0.5 * inner(deviator, deviator)
+        yielded = squared > self.yield_strain**2
+        # so that the derivative is finite where nothing flows
+        size = jnp.sqrt(jnp.where(yielded, squared, 1.0))
+        return -jnp.where(yielded, self.yield_strain / size, 1.0) * stress
+
+
+def _written_saramito() -> IsotropicFunction:
+    import sympy
+
+    yielding, size = scalars("yield_strain", "size")
+    squared = scalars("tr(sigma.sigma)") / 2 - scalars("tr(sigma)") ** 2 / 6
+    # bounded, so that the derivative is finite where nothing flows
+    where = {"size": sympy.sqrt(sympy.Max(squared, 1e-24))}
+    letters = {"yield_strain": "Y", "size": r"\left|\sigma_\mathrm{d}\right|"}
+    return IsotropicFunction({"sigma": -yielding / sympy.Max(yielding, size)}, where, letters)
+
+
+class WhiteMetzner(AbstractConstitutiveLaw):
+    """h = [(1 + (kγ̇)²)^{(1−n)/2} − 1] σ [White & Metzner, J. Appl. Polym. Sci. 7, 1867, 1963]."""
+
+    onset: Float[Array, ""] = eqx.field(converter=as_parameter)  # k, over λ
+    exponent: Float[Array, ""] = eqx.field(converter=as_parameter)  # n
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        squared = self.onset**2 * 0.5 * inner(rate, rate)
+        return ((1.0 + squared) ** (0.5 * (1.0 - self.exponent)) - 1.0) * stress
+
+
+def _written_white_metzner() -> IsotropicFunction:
+    k, n, squared = scalars("k", "n", "tr(gammadot.gammadot)")
+    return IsotropicFunction({"sigma": (1 + k**2 * squared / 2) ** ((1 - n) / 2) - 1})
 
 
 NAMED = {
@@ -219,6 +263,29 @@ NAMED = {
         },
         source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
         written=_written_fene_p,
+    ),
+    "saramito": NamedLaw(
+        "Saramito",
+        Saramito,
+        {"yield_strain": (0.0, 10.0)},
+        {
+            "yield_strain": "Saramito 2007: the strain at which the solid yields; gels and foams "
+            "yield at a tenth to a few"
+        },
+        source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
+        written=_written_saramito,
+    ),
+    "white_metzner": NamedLaw(
+        "White–Metzner",
+        WhiteMetzner,
+        {"k": (0.0, 100.0), "n": (0.0, 1.0)},
+        {
+            "k": "a law whose thinning begins at a hundredth of the rate 1/λ has another λ",
+            "n": "Bird, Armstrong & Hassager 1987, ch. 4: from a stress that rises with rate as a "
+            "Newtonian fluid's (1) to one that does not rise (0)",
+        },
+        source="White & Metzner 1963, J. Appl. Polym. Sci. 7, 1867",
+        written=_written_white_metzner,
     ),
 }
 

@@ -16,13 +16,10 @@ from tensor_library.isotropic_function import IsotropicFunction, scalars
 class ExtendedPomPom(base.AbstractConstitutiveLaw):
     """XPP law in its single-equation form   [Verbeeten, Peters & Baaijens 2001, J. Rheol. 45, 823].
 
-    With the stretch of the backbone Λ = √(1 + tr σ/3),
+    With Λ = √(1 + tr σ/3) and q arms at each end of the backbone,
 
         h = α σ·σ + (f − 1)(σ + I),
-        f = 2 (λ/λ_s) e^{2(Λ − 1)/q} (1 − 1/Λ) + (1 − α tr(σ·σ)/3)/Λ²:
-
-    λ is the time in which the backbone turns, λ_s that in which it retracts, and q the number of
-    arms at each of its ends, which hold it the less the further it is drawn.
+        f = 2 (λ/λ_s) e^{2(Λ − 1)/q} (1 − 1/Λ) + (1 − α tr(σ·σ)/3)/Λ².
     """
 
     arms: Float[Array, ""] = eqx.field(converter=base.as_parameter)  # q
@@ -66,22 +63,18 @@ _ONE_ARM = 1e-3
 class PomPom(base.AbstractConstitutiveLaw):
     """Differential pom-pom law   [McLeish & Larson 1998, J. Rheol. 42, 81].
 
-    A backbone of orientation S and stretch Λ, with q arms at each end, of which S follows an
-    auxiliary tensor A that is turned and relaxes by itself:
+    A backbone of orientation S = A/tr A and stretch Λ ≤ q, with q arms at each end:
 
-        A▽ = −(A − I),    S = A/tr A,    dΛ/dt = Λ L:S − (λ/λ_s) e^{ν(Λ−1)} (Λ − 1),    Λ ≤ q,
-        σ = 3 Λ² S − I.
+        A▽ = −(A − I),    dΛ/dt = Λ L:S − (λ/λ_s) e^{ν(Λ−1)} (Λ − 1),    σ = 3 Λ² S − I.
 
     ν = 0, or 2/(q − 1) where the drag of the arms couples to the strain at the branch points
-    [Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121, as RepTate has it; the extended pom-pom
-    law has 2/q]: a backbone drawn to q retracts e² times as fast, whatever q. Written for σ, of
-    which Λ² = 1 + tr σ/3, and with the structure variable y = ln(tr A/3),
+    [Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121, as RepTate has it]. Written for σ, with Λ²
+    = 1 + tr σ/3 and the structure variable y = ln(tr A/3),
 
         h = e^{−y} (σ − tr σ/3 I) − σ + r (σ + I),    r = 2 (λ/λ_s) e^{ν(Λ−1)} (1 − 1/Λ),
         dy/dt = S:γ̇ − 1 + e^{−y}.
 
-    At Λ = q arms are drawn in and the stretch grows no further; its growth fades over the last 5 %.
-    A is positive definite in every flow, and with it σ + I.
+    At Λ = q arms are drawn in; the growth of the stretch fades over the last 5 %.
     """
 
     arms: Float[Array, ""] = eqx.field(converter=base.as_parameter)  # q

@@ -15,13 +15,9 @@ _EXPONENT = -0.5  # δ of Likhtman & Graham
 
 
 class RoliePoly(AbstractConstitutiveLaw):
-    """Rolie–Poly law [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11].
+    """h = 2 (λ/τ_R)(1 − 1/Λ)(A + β Λ^{2δ} σ), A = I + σ, Λ = √(tr A/3), δ = −1/2.
 
-    In the conformation A = I + σ, of stretch Λ = √(tr A/3),
-
-        h = 2 (λ/τ_R)(1 − 1/Λ)(A + β Λ^{2δ} σ),    δ = −1/2:
-
-    beside reptation a stretched chain retracts in its Rouse time τ_R and releases constraints.
+    [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11]
     """
 
     stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_R/λ
@@ -68,7 +64,9 @@ class FiniteRoliePoly(AbstractConstitutiveLaw):
         released = self.constraint_release * stretch ** (2.0 * _EXPONENT)
         retracting = retraction * (conformation + released * stress / factor)
         growth = inner(conformation, rate) - trace(stress) / factor - trace(retracting)
-        stiffening = _logarithmic_slope(squared, limit) * growth / 3.0
+        # d ln k/d Λ²
+        slope = 2.0 / (limit * (3.0 - squared / limit) * (1.0 - squared / limit))
+        stiffening = slope * growth / 3.0
         return (1.0 - factor) * rate + factor * retracting - stiffening * stress
 
     def conformation(self, stress: Symmetric) -> Symmetric:
@@ -91,23 +89,15 @@ def _stiffening(squared, limit):
     return share * (3.0 - squared / limit) / (1.0 - squared / limit)
 
 
-def _logarithmic_slope(squared, limit):
-    """Return d ln k/d Λ²."""
-    return 2.0 / (limit * (3.0 - squared / limit) * (1.0 - squared / limit))
-
-
 class RoliePolyBlend(AbstractConstitutiveLaw):
     """Rolie–Double–Poly law of two components [Boudara et al. 2019, J. Rheol. 63, 71].
 
     A_ij is the conformation of component i along its entanglements with j; A_i = Σ_j φ_j A_ij, Λ_i
-    = √(tr A_i/3):
+    = √(tr A_i/3), σ = Σ_i φ_i (A_i − I), r_i = (2/τ_s,i)(1 − 1/Λ_i), δ = −1/2:
 
-        σ = Σ_i φ_i (A_i − I),
-        A_ij▽ = −½ (1/τ_i + 1/τ_j)(A_ij − I) − r_i A_ij − β r_j Λ_i^{2δ} (A_ij − I),
-        r_i = (2/τ_s,i)(1 − 1/Λ_i),    δ = −1/2.
+        A_ij▽ = −½ (1/τ_i + 1/τ_j)(A_ij − I) − r_i A_ij − β r_j Λ_i^{2δ} (A_ij − I).
 
-    The long chains' τ is λ. The four A_ij − I stand behind σ in the state, long before short; a
-    term added to h relaxes in λ. All long is `RoliePoly`.
+    The long chains' τ is λ. The four A_ij − I stand behind σ in the state, long before short.
     """
 
     long_fraction: Float[Array, ""] = eqx.field(converter=as_parameter)  # φ of the long chains
