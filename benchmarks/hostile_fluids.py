@@ -14,7 +14,6 @@ from independent import (
     Stresses,
     StressLaw,
     UpperConvectedMaxwell,
-    WhiteMetzner,
 )
 from independent.material import Rate, rate_tensor, stretched
 from scipy.integrate import solve_ivp
@@ -167,15 +166,6 @@ class Micelles(_WithLevel):
         grown += self.breaking * (self.largest - fluidity) * work
         own = self.modulus * rate_tensor(rate) + stretched(stress, rate)
         return np.append(grown, own - fluidity * stress / self.relaxation_time)
-
-
-class CarreauWhiteMetzner(WhiteMetzner):
-    """White–Metzner with λ(γ̇) = λ (1 + (k λ γ̇)²)^((n − 1)/2)   [Carreau 1972]."""
-
-    def time_at(self, rate: Rate) -> float:
-        size = np.sqrt(np.sum(rate_tensor(rate) ** 2) / 2)
-        of_rate = 1 + (self.factor * self.relaxation_time * size) ** 2
-        return self.relaxation_time * of_rate ** ((self.exponent - 1) / 2)
 
 
 @dataclass(frozen=True)

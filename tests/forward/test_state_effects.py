@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from independent import authors
-from independent.homogeneous import UNIT
+from independent.named import material
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from vectors import vector_of
@@ -142,9 +141,7 @@ def test_heat_and_work_shorten_the_relaxation_times(name):
 
 def test_a_yield_stress_raises_the_steady_stress_as_saramito_says():
     start = predict(yield_stress=0.2)[0]
-    gradient = STEADY * UNIT["shear"]
-    stress = authors.stress(authors.saramito, {"yield_strain": 0.2}, gradient, TIMES, TIME)
-    exact = MODULUS * stress[:, 0, 1]
+    exact = material("saramito", {"yield_strain": 0.2}, MODULUS, TIME).held(STEADY, TIMES)[:, 0, 1]
     np.testing.assert_allclose(start, exact, atol=1e-3 * np.max(exact))
     assert start[-1] > 1.05 * maxwell_in_start_up(MODULUS, TIME)[-1]
 
