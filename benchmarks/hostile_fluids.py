@@ -240,7 +240,7 @@ class FeneCR(RateLaw):
 
 
 @dataclass(frozen=True)
-class Acierno(RateLaw):
+class Acierno(_WithLevel):
     """σ▽ = 2 G x D − σ/(λ x^1.4) + (ẋ/x) σ, ẋ = (1 − x)/(λ x^1.4) − (a/λ x^1.4) x √(tr σ/(2 G x)).
 
     [Acierno, La Mantia, Marrucci & Titomanlio 1976, J. Non-Newtonian Fluid Mech. 1, 125]; modulus
@@ -250,23 +250,15 @@ class Acierno(RateLaw):
     breakdown: float = 0.4  # a
     modulus: float = 100.0
     relaxation_time: float = 1.0
-
-    def rest(self) -> np.ndarray:
-        return np.append(np.zeros(9), 1.0)
-
-    def scale(self) -> np.ndarray:
-        return np.append(np.full(9, self.modulus), 1.0)
+    level = 1.0
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        stress, x = state[:9].reshape(3, 3), state[9]
+        x, stress = state[0], state[1:].reshape(3, 3)
         time = self.relaxation_time * x**1.4
         load = np.sqrt(max(np.trace(stress), 0.0) / (2 * self.modulus * x))
         dx = (1 - x) / time - self.breakdown * x * load / time
         own = self.modulus * x * rate_tensor(rate) - stress / time + dx / x * stress
-        return np.append((stretched(stress, rate) + own).ravel(), dx)
-
-    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        return state[:9].reshape(3, 3)
+        return np.append(dx, stretched(stress, rate) + own)
 
 
 @dataclass(frozen=True)
