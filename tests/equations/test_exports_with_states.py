@@ -226,20 +226,6 @@ def test_what_is_no_state_is_refused(effect, values, said):
         StatePart(effect, values)
 
 
-EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
-
-
-def test_one_parameter_with_two_values_keeps_both():
-    terms = tuple(LawTerm(EXPONENTIAL, c, {"epsilon": e}) for c, e in ((1.0, 0.1), (0.5, 0.3)))
-    stress = jnp.asarray([0.7, 0.1, 0.2, 0.4])
-    trace = 1.0
-    wanted = (np.expm1(0.1 * trace) + 0.5 * np.expm1(0.3 * trace)) * np.asarray(stress)
-    extra = Equation(terms).law().extra_term(stress, jnp.zeros(4))
-    np.testing.assert_allclose(extra, wanted, rtol=1e-12)
-    assert r"\epsilon = 0.1" in Equation(terms).latex()
-    assert r"e^{0.3 " in Equation(terms).latex()
-
-
 WI = 3.0
 # oscillation so fast that start-up goes furthest
 TESTED = Where(Box((0.5, WI), (20.0, 20.0)))
