@@ -74,16 +74,6 @@ def test_of_one_component_it_is_rolie_poly(share, time):
     np.testing.assert_allclose(found, wanted, atol=3e-4 * np.max(np.abs(wanted)))
 
 
-def test_it_is_not_the_sum_of_its_components_by_themselves():
-    """Negative control: entanglements with the other component are most of a blend."""
-    found = solved(fluid(), 5.0, 0.05)[:, 3]
-    apart, names = 0.0, ("stretch_time_ratio", "short_stretch_time_ratio")
-    for share, time, name in zip((0.3, 0.7), (1.0, 0.1), names, strict=True):
-        alone = RoliePoly(CONSTANTS["beta"], CONSTANTS[name] * time, share, time)
-        apart = apart + exact(alone, 5.0 * UNIT["shear"])[:, 3]
-    assert np.max(np.abs(found - apart)) > 0.1 * np.max(apart)
-
-
 def without_stretch(gradient, times):
     """Return σ of chains that retract at once, so that no tr A_i moves from 3, (n, 4).
 

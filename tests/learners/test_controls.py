@@ -44,21 +44,6 @@ def test_the_network_is_told_of_steady_states_as_their_differences_say():
     assert np.all(np.isfinite(along.states))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("known", [0.0, MOBILITY])
-def test_a_flow_curve_alone_gives_the_mobility_that_made_it_and_nothing_that_is_known(known):
-    base = dc.Fluid(dc.make_law("giesekus", {"alpha": known}), 1.0, 1.0)
-    sindy = dc.TensorSINDy(base=base, library=LIBRARY).fit([flow_curve(NOISE)])
-    terms = {term.term: term for term in sindy.terms_}
-    if known:  # the control
-        assert not terms
-        return
-    assert list(terms) == ["sigma.sigma"]
-    low, high = terms["sigma.sigma"].ci95
-    assert low <= MOBILITY <= high
-    assert high - low < 0.05
-
-
 STIFF, SLOW_TIME, FREQUENCY = 100.0, 20.0, 1.0
 SLOWLY = dc.Fluid(modulus=STIFF, relaxation_time=SLOW_TIME)
 PERIOD = 2.0 * np.pi / FREQUENCY
