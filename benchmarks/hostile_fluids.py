@@ -14,7 +14,6 @@ from independent import (
     Stresses,
     StressLaw,
     UpperConvectedMaxwell,
-    WhiteMetzner,
 )
 from independent.material import Rate, rate_tensor, stretched
 from scipy.integrate import solve_ivp
@@ -169,15 +168,6 @@ class Micelles(_WithLevel):
         return np.append(grown, own - fluidity * stress / self.relaxation_time)
 
 
-class CarreauWhiteMetzner(WhiteMetzner):
-    """White–Metzner with λ(γ̇) = λ (1 + (k λ γ̇)²)^((n − 1)/2)   [Carreau 1972]."""
-
-    def time_at(self, rate: Rate) -> float:
-        size = np.sqrt(np.sum(rate_tensor(rate) ** 2) / 2)
-        of_rate = 1 + (self.factor * self.relaxation_time * size) ** 2
-        return self.relaxation_time * of_rate ** ((self.exponent - 1) / 2)
-
-
 @dataclass(frozen=True)
 class Thickening(Newtonian):
     """A viscous stress η γ̇ (1 + |γ̇|/γ̇_c), to stand among `Modes`."""
@@ -250,7 +240,7 @@ class FeneCR(RateLaw):
 
 
 @dataclass(frozen=True)
-class Acierno(RateLaw):
+class Acierno(_WithLevel):
     """σ▽ = 2 G x D − σ/(λ x^1.4) + (ẋ/x) σ, ẋ = (1 − x)/(λ x^1.4) − (a/λ x^1.4) x √(tr σ/(2 G x)).
 
     [Acierno, La Mantia, Marrucci & Titomanlio 1976, J. Non-Newtonian Fluid Mech. 1, 125]; modulus
@@ -260,23 +250,15 @@ class Acierno(RateLaw):
     breakdown: float = 0.4  # a
     modulus: float = 100.0
     relaxation_time: float = 1.0
-
-    def rest(self) -> np.ndarray:
-        return np.append(np.zeros(9), 1.0)
-
-    def scale(self) -> np.ndarray:
-        return np.append(np.full(9, self.modulus), 1.0)
+    level = 1.0
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        stress, x = state[:9].reshape(3, 3), state[9]
+        x, stress = state[0], state[1:].reshape(3, 3)
         time = self.relaxation_time * x**1.4
         load = np.sqrt(max(np.trace(stress), 0.0) / (2 * self.modulus * x))
         dx = (1 - x) / time - self.breakdown * x * load / time
         own = self.modulus * x * rate_tensor(rate) - stress / time + dx / x * stress
-        return np.append((stretched(stress, rate) + own).ravel(), dx)
-
-    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        return state[:9].reshape(3, 3)
+        return np.append(dx, stretched(stress, rate) + own)
 
 
 @dataclass(frozen=True)

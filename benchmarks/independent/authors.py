@@ -1,24 +1,17 @@
 """Laws of melts, solutions and gels as their authors write them, on full tensors.
 
 Each function returns what the upper-convected derivative of the conformation A = I + σ is, with
-time over the relaxation time; `stress` integrates it with scipy.
+time over the relaxation time.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from independent.material import Rate, RateLaw, stretched, velocity_gradient
 
 ONE = np.eye(3)
-
-
-def rolie_poly(a, gradient, stretch_time_ratio, beta):
-    stretch = np.sqrt(np.trace(a) / 3)
-    retraction = 2 / stretch_time_ratio * (1 - 1 / stretch)
-    return -(a - ONE) - retraction * (a + beta / stretch * (a - ONE))
 
 
 def cohen(squared, limit):
@@ -37,14 +30,6 @@ def rolie_poly_fene(a, gradient, stretch_time_ratio, beta, maximum_stretch):
     return -(a - ONE) - retraction * (a + beta / stretch * (a - ONE))
 
 
-def xpp(a, gradient, q, stretch_time_ratio, alpha):
-    s = a - ONE
-    stretch = np.sqrt(1 + abs(np.trace(s)) / 3)
-    f = 2 / stretch_time_ratio * np.exp(2 / q * (stretch - 1)) * (1 - 1 / stretch)
-    f += (1 - alpha * np.trace(s @ s) / 3) / stretch**2
-    return -(alpha * s @ s + f * s + (f - 1) * ONE)
-
-
 def white_metzner(a, gradient, k, n):
     rate = gradient + gradient.T
     size = np.sqrt(0.5 * np.trace(rate @ rate))
@@ -61,28 +46,6 @@ def saramito(a, gradient, yield_strain):
 def giesekus_non_affine(a, gradient, alpha, xi):
     s, rate = a - ONE, gradient + gradient.T
     return -s - alpha * s @ s - xi / 2 * (s @ rate + rate @ s)
-
-
-def ptt_exponential_non_affine(a, gradient, epsilon, xi):
-    s, rate = a - ONE, gradient + gradient.T
-    return -np.exp(epsilon * np.trace(s)) * s - xi / 2 * (s @ rate + rate @ s)
-
-
-def stress(law, constants, gradient, times, relaxation_time=1.0):
-    """Return σ/G in a start-up, (n, 3, 3)."""
-    scaled = gradient * relaxation_time
-
-    def change(t, y):
-        a = y.reshape(3, 3)
-        return ((scaled @ a + a @ scaled.T + law(a, scaled, **constants)) / relaxation_time).ravel()
-
-    # Radau: retraction is stiff
-    found = solve_ivp(change, (0, times[-1]), ONE.ravel(), "Radau", times, rtol=1e-9, atol=1e-11)
-    conformation = found.y.T.reshape(-1, 3, 3)
-    if law is not rolie_poly_fene:
-        return conformation - ONE
-    squared = np.trace(conformation, axis1=1, axis2=2) / 3
-    return cohen(squared, constants["maximum_stretch"] ** 2)[:, None, None] * (conformation - ONE)
 
 
 @dataclass(frozen=True)

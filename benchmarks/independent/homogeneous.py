@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
+
+from independent.laws import multimode_giesekus
+from independent.material import integrate
 
 # Velocity gradients at unit rate, written out   [Bird, Armstrong & Hassager 1987, section 3.1]
 UNIT = {
@@ -46,24 +48,13 @@ class GiesekusFluid:
         `kind`: one of `UNIT`. `rate` in 1/s, of time in s. `times`: increasing, after `begins`,
         when the fluid is at rest. `jumps`: times at which the rate jumps.
         """
-        modes = len(self.modulus)
-
-        def slope(t, y):
-            gradient = UNIT[kind] * rate(t)
-            out = []
-            for stress, modulus, time in zip(
-                y.reshape(modes, 3, 3), self.modulus, self.relaxation_time, strict=True
-            ):
-                made = modulus * (gradient + gradient.T) + gradient @ stress + stress @ gradient.T
-                out.append(made - (stress + self.mobility / modulus * stress @ stress) / time)
-            return np.ravel(out)
-
-        y, t, found = np.zeros(9 * modes), begins, {}
-        for end in [*sorted(jumps), times[-1]]:
-            inside = np.unique([*times[(times > t) & (times <= end)], end])
-            solution = solve_ivp(slope, (t, end), y, t_eval=inside, rtol=1e-9, atol=1e-9)
-            found |= dict(zip(solution.t, solution.y.T, strict=True))
-            y, t = solution.y[:, -1], end
-        total = np.array([found[t].reshape(modes, 3, 3).sum(axis=0) for t in times])
+        law = multimode_giesekus(
+            [self.mobility] * len(self.modulus), self.modulus, self.relaxation_time
+        )
+        states = integrate(
+            lambda t, y: law.change(y, UNIT[kind] * rate(t + begins)), law.rest(), times - begins,
+            [jump - begins for jump in jumps], law.scale(),
+        )  # fmt: skip
         gradients = np.array([UNIT[kind] * rate(t) for t in times])
+        total = np.array([law.stress(state, 0.0) for state in states])
         return total + self.solvent_viscosity * (gradients + np.swapaxes(gradients, 1, 2))

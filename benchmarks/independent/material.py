@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from independent.flow import Flow
 
@@ -84,6 +85,17 @@ class RateLaw(Material):
         )
         return differences([self.stress(state, gradient) for state in states]).N1
 
+    def held(self, gradient: Rate, times: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
+        """Return σ in Pa, shape (n, 3, 3), from rest in a flow that is held; Radau, for the stiff.
+
+        `gradient`: shear rate or velocity gradient in 1/s. `times` in s, after 0.
+        """
+        found = solve_ivp(
+            lambda _, state: self.change(state, gradient), (0.0, times[-1]), self.rest(), "Radau",
+            times, rtol=tolerance, atol=0.01 * tolerance * self.scale(),
+        )  # fmt: skip
+        return np.array([self.stress(state, gradient) for state in found.y.T])
+
 
 def integrate(
     change, start: np.ndarray, times: np.ndarray, jumps=(), scale: float | np.ndarray = 1.0
@@ -92,8 +104,6 @@ def integrate(
 
     Raises ValueError if the integrator gives up: the state runs away.
     """
-    from scipy.integrate import solve_ivp
-
     end = float(times[-1])
     knots = [0.0, *(j for j in jumps if 0.0 < j < end), end]
     states, state = np.empty((len(times), len(start))), np.asarray(start, float)

@@ -30,10 +30,9 @@ def softening(strain, omega=10.0):
 
 
 def lines(*columns, mark="\t", comma=False, before=""):
-    rows = [
-        mark.join([before, *row] if before else row)
-        for row in (map(repr, row) for row in zip(*(c.tolist() for c in columns), strict=True))
-    ]
+    """Return rows of columns; a number stands in every row."""
+    cells = zip(*(c.tolist() for c in np.broadcast_arrays(*columns)), strict=True)
+    rows = [mark.join([*([before] if before else []), *map(repr, row)]) for row in cells]
     return [row.replace(".", ",") for row in rows] if comma else rows
 
 
@@ -54,6 +53,12 @@ def imported(tmp_path, name, rows, *options, encoding="utf-8", code=0):
     path = tmp_path / name
     path.write_bytes("\r\n".join(rows).encode(encoding))
     return run(tmp_path, path, *options, code=code)
+
+
+def exported(tmp_path, head, *columns, options=(), code=0, name="a.csv"):
+    """Import a table of columns below one line or several of a head."""
+    rows = [*([head] if isinstance(head, str) else head), *lines(*columns, mark=",")]
+    return imported(tmp_path, name, rows, *options, code=code)
 
 
 def run(tmp_path, *arguments, code=0):
@@ -104,6 +109,10 @@ def assert_sweep(path, omega=OMEGA, shift=1.0):
     np.testing.assert_allclose(found["omega_rad_s"][order], omega, rtol=EXACT)
     for key, wanted in zip(("Gp_Pa", "Gpp_Pa"), moduli(omega, shift), strict=True):
         np.testing.assert_allclose(found[key][order], wanted, rtol=EXACT)
+
+
+def assert_curve(folder, factor, name="flow_curve.csv"):
+    np.testing.assert_allclose(table(folder / name)["stress_Pa"], factor * RATES, rtol=EXACT)
 
 
 def assert_softening(path):

@@ -8,7 +8,7 @@ import numpy as np
 import openpyxl
 import pytest
 from command_line import invoke
-from made_exports import EXACT, OMEGA, TIMES, assert_sweep, imported, lines, moduli, run
+from made_exports import EXACT, OMEGA, TIMES, assert_sweep, exported, imported, lines, moduli, run
 
 from discover.dataset import load_dataset
 
@@ -17,7 +17,7 @@ SHEET = (
 )
 SWEEP = ["omega (rad/s),G' (Pa),G'' (Pa)", *lines(OMEGA, *moduli(OMEGA), mark=",")]
 START = ["Time [s],Shear rate [1/s],Stress [Pa]"]
-START += lines(TIMES, np.full(30, 0.5), TIMES, mark=",")
+START += lines(TIMES, 0.5, TIMES, mark=",")
 
 
 def workbook(path, far=None, sheet=None):
@@ -181,9 +181,8 @@ def test_a_temperature_that_cannot_be_is_named_and_not_used(tmp_path, line):
 
 
 def test_a_number_of_the_header_that_is_none_is_named(tmp_path):
-    rows = ["Shear rate: 1e999 1/s", "Time [s],Stress [Pa]", *lines(TIMES, TIMES, mark=",")]
-    _, result = imported(tmp_path, "a.csv", rows, code=2)
+    head = "Time [s],Stress [Pa]"
+    _, result = exported(tmp_path, ["Shear rate: 1e999 1/s", head], TIMES, TIMES, code=2)
     assert "Shear rate 1e999, more than a number can be" in result.stderr
-    rows[0] = "Shear rate: 0.5 1/s"
-    out, _ = imported(tmp_path, "a.csv", rows)
-    np.testing.assert_allclose(load_dataset(out)["a.csv"].stress, TIMES, rtol=EXACT)
+    made = exported(tmp_path, ["Shear rate: 0.5 1/s", head], TIMES, TIMES)
+    np.testing.assert_allclose(made.run.stress, TIMES, rtol=EXACT)

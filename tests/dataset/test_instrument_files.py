@@ -1,5 +1,6 @@
 """Exports of each shape, by formats and by their numbers, come out as the test that they hold."""
 
+import made_exports as ex
 import numpy as np
 import openpyxl
 import pytest
@@ -10,15 +11,14 @@ from made_exports import (
     RATES,
     STRAINS,
     TIMES,
-    G,
     assert_softening,
     assert_sweep,
+    exported,
     imported,
     lines,
     moduli,
     run,
     softening,
-    table,
 )
 
 from discover.dataset import load_dataset
@@ -34,12 +34,10 @@ def trios(mark):
     rows = [*head, *osc, ""]
     rows[rows.index("{}")] = "Amplitude sweep - 1"
     a, b = softening(STRAINS)
-    still = np.zeros(9)
-    rows[-1:] = lines(still + 10.0, STRAINS * 100, still, a * 1e-6, b * 1e-3, mark=mark)
+    rows[-1:] = lines(10.0, STRAINS * 100, 0.0, a * 1e-6, b * 1e-3, mark=mark)
     rows += ["", *(line.replace("{}", "Frequency sweep - 2") for line in osc)]
     a, b = moduli(OMEGA)
-    still = np.zeros(13)
-    rows += lines(OMEGA, still + 1.0, still, a * 1e-6, b * 1e-3, mark=mark)
+    rows += lines(OMEGA, 1.0, 0.0, a * 1e-6, b * 1e-3, mark=mark)
     rows += ["", "[step]", "Flow sweep - 3", mark.join(("Stress", "Shear rate", "Step time"))]
     rows += [mark.join(("Pa", "1/s", "min"))]
     return rows + lines(RATES * 3.0, RATES, np.arange(1.0, 12.0), mark=mark)
@@ -50,7 +48,7 @@ def test_steps_of_trios_become_the_tables_that_they_are(tmp_path, name, mark):
     out, result = imported(tmp_path, name, trios(mark))
     assert_softening(out / "amplitude_sweep.csv")
     assert_sweep(out / "lve.csv")
-    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3.0 * RATES, rtol=EXACT)
+    ex.assert_curve(out, 3.0)
     assert not (out / "runs.csv").exists()
     assert "block 1 Amplitude sweep - 1: read as an amplitude sweep" in result.stdout
     again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
@@ -78,8 +76,8 @@ def ares(temperatures):
         rows += ["[Step]", f"Step name\tFrequency sweep ({degrees} °C)", "Number of points\t13"]
         rows += ["Variables\tTemperature\tAngular frequency\tStorage modulus\tLoss modulus"]
         rows += ["Units\t°C\trad/s\tPa\tPa"]
-        a, b = moduli(OMEGA, 2.0 ** (-degrees / 10))
-        rows += lines(np.full(13, float(degrees)), OMEGA, a, b, before="Data point")
+        shifted = moduli(OMEGA, 2.0 ** (-degrees / 10))
+        rows += lines(float(degrees), OMEGA, *shifted, before="Data point")
     return rows
 
 
@@ -126,7 +124,7 @@ def test_actions_of_rspace_are_told_apart_by_their_name_in_the_first_column(tmp_
                        strict=True):  # fmt: skip
         rows.append(f"Frequency table;1.0;;;1.0;{w!r};{a!r};{b!r};25.0".replace(".", ","))
     out, _ = imported(tmp_path, "a.csv", rows)
-    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3 * RATES, rtol=EXACT)
+    ex.assert_curve(out, 3.0)
     assert_sweep(out / "lve.csv")
 
 
@@ -141,7 +139,7 @@ def test_segments_of_rheowin_are_told_apart_by_their_number(tmp_path):
     test = made.run
     np.testing.assert_allclose(test.stress, start, rtol=EXACT)
     np.testing.assert_allclose(test.rate, 0.15)
-    assert len(table(made.folder / "flow_curve.csv")["stress_Pa"]) == 11
+    ex.assert_curve(made.folder, 3.0)
 
 
 def test_files_of_reptate_are_what_their_suffix_says(tmp_path):
@@ -149,7 +147,7 @@ def test_files_of_reptate_are_what_their_suffix_says(tmp_path):
     files = {
         "a.tts": ["Mw=10;T=160;", "w G' G''", "rad/s Pa Pa", *lines(OMEGA, *moduli(OMEGA))],
         # RepTate divides this column by the rate, whatever stands above it
-        "b.shear": ["gdot=0.5;T=160;", "time\th", "s\tPa-s", *lines(TIMES, TIMES * 2, TIMES * 0)],
+        "b.shear": ["gdot=0.5;T=160;", "time\th", "s\tPa-s", *lines(TIMES, TIMES * 2, 0.0)],
         "c.uext": ["gdot=0.1;T=160", *lines(TIMES, TIMES * 7)],
         "d.laos": ["omega=1.0;gamma=2.0;", "#Time(s)\tStrain(-)\ttau_yx(Pa)",
                    *lines(x, 2 * np.sin(x), 3 * np.sin(x + 0.5))],
@@ -193,21 +191,18 @@ def test_real_exports_of_trios_are_what_their_steps_are_called(measured_data, tm
 
 def test_a_rate_that_alternates_is_not_taken_for_a_strain_without_a_name(tmp_path):
     time = np.linspace(0.0, 12.0, 300)
-    stress = (np.cos(time) + np.sin(time) - np.exp(-time)) * G / 2  # from rest, Maxwell, De = 1
-    rows = ["time_s,shear_rate_1_s,stress_Pa", *lines(time, np.cos(time), stress, mark=",")]
-    test = imported(tmp_path, "a.csv", rows).run
+    stress = np.cos(time) + np.sin(time) - np.exp(-time)  # from rest, Maxwell, De = 1
+    test = exported(tmp_path, "time_s,shear_rate_1_s,stress_Pa", time, np.cos(time), stress).run
     np.testing.assert_allclose(test.rate, np.cos(time), rtol=EXACT)
     assert "start" not in test.metadata
 
 
 def test_a_clock_that_goes_on_from_interval_to_interval_starts_anew_with_each(tmp_path):
     head = "Interval data:\tPoint No.\tTime\tShear Rate\tShear Stress", "\t\t[s]\t[1/s]\t[Pa]"
-    start = 30.0 * (1 - np.exp(-TIMES / LAMBDA))
-    still = np.full(30, 0.5)
-    rows = []
+    start, rows = 30.0 * (1 - np.exp(-TIMES / LAMBDA)), []
     for begin in (0.0, 10.0):
-        rows += ["", *head, *(f"\t{i}\t{row}" for i, row in enumerate(
-            lines(begin + TIMES, still * (1 + begin), start), start=1))]  # fmt: skip
+        counted = enumerate(lines(begin + TIMES, 0.5 * (1 + begin), start), start=1)
+        rows += ["", *head, *(f"\t{i}\t{row}" for i, row in counted)]
     out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
     for test in load_dataset(out):
         np.testing.assert_allclose(test.time, TIMES, rtol=1e-12, atol=1e-14)
@@ -220,19 +215,18 @@ def test_a_sine_of_stress_is_imposed_and_its_start_is_seen_in_the_strain(tmp_pat
     strain = 0.1 * np.sin(time) - 0.3 * np.cos(time) + 0.03 * np.sin(3 * time)
     if at_rest:
         strain += 0.3 * np.exp(-time / 5.0)  # what starts from zero and fades
-    rows = ["time_s,stress_Pa,strain", *lines(time, np.sin(time), strain, mark=",")]
-    test = imported(tmp_path, "a.csv", rows).run
+    test = exported(tmp_path, "time_s,stress_Pa,strain", time, np.sin(time), strain).run
     assert test.protocol.control == "stress"
     assert ("start" in test.metadata) is not at_rest
 
 
 def test_an_amplitude_sweep_without_a_frequency_says_where_to_write_it(tmp_path):
-    rows = ["strain_percent,Gp_Pa,Gpp_Pa", *lines(100 * STRAINS, *softening(STRAINS), mark=",")]
-    out, result = imported(tmp_path, "a.csv", rows)
+    head, columns = "strain_percent,Gp_Pa,Gpp_Pa", (100 * STRAINS, *softening(STRAINS))
+    out, result = exported(tmp_path, head, *columns)
     assert "amplitude_sweep_rad_s" in result.stdout
-    np.testing.assert_allclose(table(out / "amplitude_sweep.csv")["strain"], STRAINS, rtol=EXACT)
-    rows.insert(0, "Frequency [rad/s]: 10")
-    out, _ = imported(tmp_path, "a.csv", rows, "--overwrite")
+    told = ex.table(out / "amplitude_sweep.csv")
+    np.testing.assert_allclose(told["strain"], STRAINS, rtol=EXACT)
+    exported(tmp_path, ["Frequency [rad/s]: 10", head], *columns, options=["--overwrite"])
     assert_softening(out / "amplitude_sweep.csv")
 
 
@@ -268,8 +262,8 @@ def test_creep_and_the_recovery_after_it_are_one_run(tmp_path):
     rise = 0.2 + 0.1 * TIMES
     fall = rise[-1] - 0.2 * (1 - np.exp(-TIMES))
     made = steps(
-        ("Creep - 1", {"Step time": TIMES, "Stress": TIMES * 0 + 50.0, "Strain": rise * 100}),
-        ("Recovery - 2", {"Step time": TIMES, "Stress": TIMES * 0 + 1e-4, "Strain": fall * 100}),
+        ("Creep - 1", {"Step time": TIMES, "Stress": 50.0, "Strain": rise * 100}),
+        ("Recovery - 2", {"Step time": TIMES, "Stress": 1e-4, "Strain": fall * 100}),
     )
     test = imported(tmp_path, "a.txt", made).run
     assert test.protocol.control == "stress"
@@ -279,7 +273,7 @@ def test_creep_and_the_recovery_after_it_are_one_run(tmp_path):
 
 
 def test_a_run_in_a_file_that_is_called_as_a_table_is_still_a_run(tmp_path):
-    columns = {"Step time": TIMES, "Stress": TIMES * 0 + 50.0, "Strain": 20 + 10 * TIMES}
+    columns = {"Step time": TIMES, "Stress": 50.0, "Strain": 20 + 10 * TIMES}
     out, _ = imported(tmp_path, "creep.txt", steps(("Creep", columns)))
     assert load_dataset(out).names == ("creep-run.csv",)
 
@@ -287,7 +281,7 @@ def test_a_run_in_a_file_that_is_called_as_a_table_is_still_a_run(tmp_path):
 def test_the_rise_of_a_step_of_strain_is_told_from_what_follows(tmp_path):
     time = np.concatenate([[0.0, 0.01, 0.02], 0.03 + TIMES])
     strain = np.concatenate([[0.0, 33.0, 66.0], np.full(30, 100.0)])
-    stress = G * np.concatenate([[0.0, 0.33, 0.66], np.exp(-TIMES / LAMBDA)])
+    stress = ex.G * np.concatenate([[0.0, 0.33, 0.66], np.exp(-TIMES / LAMBDA)])
     made = steps(("Stress relaxation", {"Step time": time, "Strain": strain, "Stress": stress}))
     test = imported(tmp_path, "a.txt", made).run
     assert float(test.metadata["step_strain"]) == 1.0
@@ -297,53 +291,47 @@ def test_the_rise_of_a_step_of_strain_is_told_from_what_follows(tmp_path):
 
 
 def test_what_follows_a_steady_flow_starts_from_it(tmp_path):
-    start = 50.0 * (1 - np.exp(-TIMES / LAMBDA))
+    fading = np.exp(-TIMES / LAMBDA)
+    start = 50.0 * (1 - fading)
     made = steps(
-        ("Peak hold - 1", {"Step time": TIMES, "Shear rate": TIMES * 0 + 0.5, "Stress": start}),
-        ("Peak hold - 2", {"Step time": TIMES, "Shear rate": TIMES * 0,
-                           "Stress": start[-1] * np.exp(-TIMES / LAMBDA)}),
-        ("Peak hold - 3", {"Step time": TIMES, "Shear rate": TIMES * 0, "Stress": TIMES * 0}),
-    )  # fmt: skip
+        ("Peak hold - 1", {"Step time": TIMES, "Shear rate": 0.5, "Stress": start}),
+        ("Peak hold - 2", {"Step time": TIMES, "Shear rate": 0.0, "Stress": start[-1] * fading}),
+        ("Peak hold - 3", {"Step time": TIMES, "Shear rate": 0.0, "Stress": 0.0}),
+    )
     out, result = imported(tmp_path, "a.txt", made)
     first, second = load_dataset(out)
     assert (first.rate_before, second.rate_before) == (0.0, 0.5)
     assert "block 3 Peak hold - 3: left out" in result.stdout
 
 
-LEFT_OUT = {
-    "a time sweep": (np.full(13, 10.0), np.full(13, 1.0), np.full(13, 25.0), "a time sweep"),
-    "a temperature sweep": (np.full(13, 10.0), np.full(13, 1.0), 25.0 + 2 * np.arange(13.0),
-                            "a temperature sweep"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", LEFT_OUT)
-def test_oscillations_that_nothing_is_fitted_to_are_said_not_taken(tmp_path, case):
-    omega, strain, degrees, word = LEFT_OUT[case]
-    rows = ["Time,Angular frequency,Strain,G',G'',Temperature", "s,rad/s,%,Pa,Pa,°C"]
-    rows += lines(TIMES[:13], omega, strain, *moduli(OMEGA), degrees, mark=",")
-    out, result = imported(tmp_path, "a.csv", rows, code=2)
-    assert word in result.stderr
+@pytest.mark.parametrize(
+    ("said", "degrees"),
+    [("a time sweep", 25.0), ("a temperature sweep", 25.0 + 2 * np.arange(13.0))],
+)
+def test_oscillations_that_nothing_is_fitted_to_are_said_not_taken(tmp_path, said, degrees):
+    head = ["Time,Angular frequency,Strain,G',G'',Temperature", "s,rad/s,%,Pa,Pa,°C"]
+    columns = TIMES[:13], 10.0, 1.0, *moduli(OMEGA), degrees
+    out, result = exported(tmp_path, head, *columns, code=2)
+    assert said in result.stderr
     assert "--test" in result.stderr
     assert not out.exists()
 
 
 def test_a_rise_of_the_rate_in_time_is_a_run_where_the_user_says_so(tmp_path):
-    rows = ["Time,Shear rate,Shear stress", "s,1/s,Pa"]
-    rows += lines(np.arange(1.0, 12.0), RATES, 3 * RATES, mark=",")
-    out, result = imported(tmp_path, "a.csv", rows)
+    head = ["Time,Shear rate,Shear stress", "s,1/s,Pa"]
+    columns = np.arange(1.0, 12.0), RATES, RATES
+    out, result = exported(tmp_path, head, *columns)
     assert (out / "flow_curve.csv").exists()
     assert "every row has another rate" in result.stdout
-    out, _ = imported(tmp_path, "a.csv", rows, "--test", "run", "--overwrite")
+    exported(tmp_path, head, *columns, options=("--test", "run", "--overwrite"))
     assert load_dataset(out).names == ("a.csv",)
 
 
 def test_moduli_follow_from_their_size_and_angle(tmp_path):
     a, b = moduli(OMEGA)
-    rows = ["Frequency,Complex viscosity,Phase angle", "Hz,Pa.s,°"]
+    head = ["Frequency,Complex viscosity,Phase angle", "Hz,Pa.s,°"]
     columns = OMEGA / (2 * np.pi), np.hypot(a, b) / OMEGA, np.degrees(np.arctan2(b, a))
-    out, _ = imported(tmp_path, "a.csv", rows + lines(*columns, mark=","))
-    found = table(out / "lve.csv")
+    found = ex.table(exported(tmp_path, head, *columns).folder / "lve.csv")
     # arctan and back costs some roundings of the smaller modulus
     np.testing.assert_allclose(found["Gp_Pa"], a, rtol=1e-10)
     np.testing.assert_allclose(found["Gpp_Pa"], b, rtol=1e-10)

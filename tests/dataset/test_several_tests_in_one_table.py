@@ -1,32 +1,20 @@
 """One table that holds several tests is read as each of them, and nothing is left out unsaid."""
 
+import made_exports as made
 import numpy as np
 import pytest
-from made_exports import (
-    EXACT,
-    LAMBDA,
-    OMEGA,
-    RATES,
-    TIMES,
-    G,
-    assert_sweep,
-    imported,
-    lines,
-    moduli,
-    run,
-    table,
-)
+from made_exports import EXACT, LAMBDA, OMEGA, RATES, TIMES, assert_sweep, exported, imported, lines
 
 from discover.dataset import load_dataset
 from discover.dataset.importing.text_rows import temperature_in
 
 
 def start_up(rate):
-    return G * LAMBDA * rate * (1 - np.exp(-TIMES / LAMBDA))
+    return made.G * LAMBDA * rate * (1 - np.exp(-TIMES / LAMBDA))
 
 
 def sweep(shift=1.0):
-    return OMEGA, *moduli(OMEGA, shift)
+    return OMEGA, *made.moduli(OMEGA, shift)
 
 
 def assert_start_ups(folder, names, rates):
@@ -51,14 +39,14 @@ SWEEPS_SIDE_BY_SIDE = {
 
 @pytest.mark.parametrize("case", SWEEPS_SIDE_BY_SIDE)
 def test_sweeps_side_by_side_are_one_for_each_temperature(tmp_path, case):
-    cold, warm = moduli(OMEGA), moduli(OMEGA, 0.1)
+    cold, warm = made.moduli(OMEGA), made.moduli(OMEGA, 0.1)
     pairs = zip(cold, warm, strict=True) if case == "grouped by what they are" else (cold, warm)
     columns = OMEGA, *(modulus for pair in pairs for modulus in pair)
-    rows = [*SWEEPS_SIDE_BY_SIDE[case], *lines(*columns, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
+    head = SWEEPS_SIDE_BY_SIDE[case]
+    out, _ = exported(tmp_path, head, *columns)
     assert_sweep(out / "lve_20C.csv")
     assert_sweep(out / "lve_40C.csv", shift=0.1)
-    out, _ = imported(tmp_path, "a.csv", rows, "--temperature", 40, "--overwrite")
+    exported(tmp_path, head, *columns, options=("--temperature", 40, "--overwrite"))
     assert_sweep(out / "lve.csv", shift=0.1)
 
 
@@ -71,16 +59,15 @@ RUNS_SIDE_BY_SIDE = {
 
 @pytest.mark.parametrize("case", RUNS_SIDE_BY_SIDE)
 def test_pairs_of_time_and_stress_are_runs_at_the_rates_above_them(tmp_path, case):
-    rows = RUNS_SIDE_BY_SIDE[case] + lines(TIMES, start_up(0.5), TIMES, start_up(2.0), mark=",")
-    out, _ = imported(tmp_path, "a.csv", rows)
+    columns = TIMES, start_up(0.5), TIMES, start_up(2.0)
+    out, _ = exported(tmp_path, RUNS_SIDE_BY_SIDE[case], *columns)
     assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
 
 
 @pytest.mark.parametrize("count", [("", ".1"), ("_1", "_2")])
 def test_columns_that_are_counted_are_runs_which_may_differ_in_length(tmp_path, count):
     names = [f"{name}{k}" for k in count for name in ("Time [s]", "Rate [1/s]", "Stress [Pa]")]
-    rate = np.full(30, 0.5)
-    rows = lines(TIMES, rate, start_up(0.5), TIMES, 4 * rate, start_up(2.0), mark=",")
+    rows = lines(TIMES, 0.5, start_up(0.5), TIMES, 2.0, start_up(2.0), mark=",")
     shorter = [",".join([*row.split(",")[:3], "", "", ""]) for row in rows[20:]]
     out, _ = imported(tmp_path, "a.csv", [",".join(names), *rows[:20], *shorter])
     first, second = load_dataset(out)
@@ -126,51 +113,46 @@ def test_runs_below_each_other_or_in_turn_are_told_apart(tmp_path, case):
     assert_start_ups(out, *told)
     assert words in result.stdout
     assert words or "stands before it" not in result.stdout
-    again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
+    again, _ = made.run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
     assert_start_ups(again, *told)
 
 
 def test_a_quantity_that_stands_in_a_table_twice_makes_no_second_test(tmp_path):
-    rows = ["Time (s),Temperature (°C),Shear rate (1/s),Temperature (°C),Stress (Pa)"]
-    columns = TIMES, np.full(30, 25.0), np.full(30, 0.5), np.full(30, 25.1), start_up(0.5)
-    out, _ = imported(tmp_path, "a.csv", rows + lines(*columns, mark=","))
+    head = "Time (s),Temperature (°C),Shear rate (1/s),Temperature (°C),Stress (Pa)"
+    out, _ = exported(tmp_path, head, TIMES, 25.0, 0.5, 25.1, start_up(0.5))
     assert_start_ups(out, ("a.csv",), (0.5,))
 
 
 def test_a_clock_that_goes_on_through_steps_of_rate_is_one_run(tmp_path):
     columns = stacked(*((TIMES + 10.0 * k, rate, start_up(rate))
                         for k, rate in enumerate((0.5, 2.0, 0.5))))  # fmt: skip
-    rows = ["Time (s),Shear rate (1/s),Stress (Pa)", *lines(*columns, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
-    assert len(load_dataset(out)["a.csv"].time) == 90
+    made = exported(tmp_path, "Time (s),Shear rate (1/s),Stress (Pa)", *columns)
+    assert len(made.run.time) == 90
+
+
+CURVE = "shear_rate_1_s,stress_Pa,temperature_C"
 
 
 @pytest.mark.parametrize("mixed", [False, True])
 def test_flow_curves_at_two_temperatures_are_two(tmp_path, mixed):
     columns = stacked((RATES, 3.0 * RATES, 20.1), (RATES, 0.3 * RATES, 60.0))
-    columns = in_turn(columns) if mixed else columns
-    rows = ["shear_rate_1_s,stress_Pa,temperature_C", *lines(*columns, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
-    for degrees, factor in (("20.1", 3.0), ("60", 0.3)):
-        found = table(out / f"flow_curve_{degrees}C.csv")
-        np.testing.assert_allclose(found["stress_Pa"], factor * RATES, rtol=EXACT)
+    out, _ = exported(tmp_path, CURVE, *(in_turn(columns) if mixed else columns))
+    made.assert_curve(out, 3.0, "flow_curve_20.1C.csv")
+    made.assert_curve(out, 0.3, "flow_curve_60C.csv")
 
 
 def test_a_thermometer_that_drifts_makes_one_curve_and_a_ramp_makes_none(tmp_path):
-    head = ["shear_rate_1_s,stress_Pa,temperature_C"]
-    drift = 20.0 + 0.2 * np.arange(11.0)
-    out, _ = imported(tmp_path, "a.csv", head + lines(RATES, 3 * RATES, drift, mark=","))
-    assert len(table(out / "flow_curve.csv")["stress_Pa"]) == 11
-    ramp = 20.0 + 4.0 * np.arange(11.0)
-    _, result = imported(tmp_path, "b.csv", head + lines(RATES, RATES, ramp, mark=","), code=2)
+    out, _ = exported(tmp_path, CURVE, RATES, 3 * RATES, 20.0 + 0.2 * np.arange(11.0))
+    made.assert_curve(out, 3.0)
+    ramp = RATES, RATES, 20.0 + 4.0 * np.arange(11.0)
+    _, result = exported(tmp_path, CURVE, *ramp, code=2, name="b.csv")
     assert "at no one temperature, but from 22 to 58 °C" in result.stderr
 
 
 def test_curves_below_each_other_are_told_by_rates_that_start_again(tmp_path):
     columns = stacked((RATES, 3.0 * RATES), (RATES, 0.3 * RATES))
-    rows = ["shear_rate_1_s,stress_Pa", *lines(*columns, mark=",")]
-    out, result = imported(tmp_path, "a.csv", rows)
-    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3 * RATES, rtol=EXACT)
+    out, result = exported(tmp_path, "shear_rate_1_s,stress_Pa", *columns)
+    made.assert_curve(out, 3.0)
     assert "Nothing says its temperature" in result.stdout
 
 
@@ -179,11 +161,11 @@ def test_a_table_of_a_calibration_is_no_test_of_the_sample(tmp_path):
         "Model X", "", "-- {} --", "Slope = 13.5", "Rotor speed,Shear rate,Shear stress",
         "(rpm),(1/s),(Pa)", *lines(RATES, RATES, 0.2 * RATES, mark=","), "****", "-- Data --",
         "Time,Shear rate,Shear stress,Signal", "(s),(1/s),(Pa),(V)",
-        *lines(TIMES, np.full(30, 0.5), start_up(0.5), TIMES, mark=","),
+        *lines(TIMES, 0.5, start_up(0.5), TIMES, mark=","),
     ]  # fmt: skip
     for title in ("Calibration Data", "Reference oil", "Kalibrierung", "Blank run (air)"):
-        made = [row.format(title) for row in rows]
-        out, result = imported(tmp_path, "a.csv", made, "--overwrite")
+        told = [row.format(title) for row in rows]
+        out, result = imported(tmp_path, "a.csv", told, "--overwrite")
         assert_start_ups(out, ("a-2.csv",), (0.5,))
         assert not (out / "flow_curve.csv").exists()
         assert f"block 1 {title}: left out" in result.stdout
@@ -191,7 +173,7 @@ def test_a_table_of_a_calibration_is_no_test_of_the_sample(tmp_path):
         assert "columns not read: Signal." in result.stdout
     plain = [row.format("Blank ink, flow curve") for row in rows]
     out, _ = imported(tmp_path, "a.csv", plain, "--overwrite")
-    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 0.2 * RATES, rtol=EXACT)
+    made.assert_curve(out, 0.2)
 
 
 def test_a_table_whose_first_column_is_the_time_of_day_is_not_passed_over(tmp_path):
@@ -217,7 +199,7 @@ def test_a_table_that_cannot_be_read_does_not_keep_the_others_from_being_read(tm
     rows = ["[step]", "Sweep - 1", "Angular frequency\tStorage modulus\tLoss modulus",
             "rad/s\tPa\tPa", *lines(*sweep()), "", "[step]", "Hold - 2",
             "Step time\tShear rate\tStress", "s\t1/s\tblorp",
-            *lines(TIMES, np.full(30, 1.0), TIMES)]  # fmt: skip
+            *lines(TIMES, 1.0, TIMES)]  # fmt: skip
     out, result = imported(tmp_path, "a.txt", rows)
     assert_sweep(out / "lve.csv")
     assert "not read: a.txt, block 2 Hold - 2" in result.stderr

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_exports import LAMBDA, TIMES, G, imported, lines, table
+from made_exports import LAMBDA, TIMES, G, exported, imported, lines, table
 
 from discover.dataset import check_folder, load_dataset
 
@@ -12,23 +12,21 @@ RATE = 0.1 + 0.4 * np.exp(-2.0 * TIMES)
 """Of a creep whose strain is 0.1 t + 0.2 (1 - exp(-2 t))."""
 STARTED = 30.0 * (1 - np.exp(-TIMES / LAMBDA))
 RELAXED = 0.1 * G * np.exp(-TIMES / LAMBDA)
-HELD = np.full(30, 50.0)
-NONE = np.zeros(30)
 UP = np.linspace(5.0, 100.0, 20)
 THERE_AND_BACK = np.concatenate([UP, UP[::-1]])
 EVERY_3_S = 3.0 * np.arange(1, 41)
 
 
 def export(tmp_path, columns, *above, code=0, name="a.csv", options=()):
-    rows = [*above, ",".join(columns), *lines(*map(np.asarray, columns.values()), mark=",")]
-    return imported(tmp_path, name, rows, *options, code=code)
+    head = [*above, ",".join(columns)]
+    return exported(tmp_path, head, *columns.values(), options=options, code=code, name=name)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_a_creep_that_is_exported_with_its_rate_is_a_run_at_given_stress(tmp_path, noise):
     scatter = 1.0 + noise * np.random.default_rng(2).standard_normal(30)
     out, result = export(
-        tmp_path, {"Time [s]": TIMES, "Stress [Pa]": HELD, "Shear rate [1/s]": RATE * scatter}
+        tmp_path, {"Time [s]": TIMES, "Stress [Pa]": 50.0, "Shear rate [1/s]": RATE * scatter}
     )
     (test,) = load_dataset(out)
     assert test.protocol.control == "stress"
@@ -41,8 +39,8 @@ def test_a_creep_that_is_exported_with_its_rate_is_a_run_at_given_stress(tmp_pat
 @pytest.mark.parametrize("which", ["rate", "noisy rate", "noisy stress"])
 def test_a_flow_at_a_given_rate_whose_stress_is_constant_stays_one(tmp_path, which):
     scatter = np.random.default_rng(5).standard_normal(30)
-    rate = 0.5 * (1 + 0.05 * scatter) if which == "noisy rate" else np.full(30, 0.5)
-    stress = HELD * (1 + 0.005 * scatter) if which != "rate" else STARTED
+    rate = 0.5 * (1 + 0.05 * scatter) if which == "noisy rate" else 0.5
+    stress = 50.0 * (1 + 0.005 * scatter) if which != "rate" else STARTED
     out, _ = export(tmp_path, {"Time [s]": TIMES, "Stress [Pa]": stress, "Shear rate [1/s]": rate})
     assert load_dataset(out)[0].protocol.control == "rate"
 
@@ -56,7 +54,8 @@ def test_a_flow_at_a_given_rate_whose_stress_is_constant_stays_one(tmp_path, whi
 )  # fmt: skip
 def test_creep_and_recovery_are_one_run_whatever_their_clock(tmp_path, moved, starts, title):
     strain, rate = np.append(CREEP, RECOVERY), np.append(RATE, -0.2 * np.exp(-TIMES))
-    columns = {"Time [s]": np.append(TIMES, starts + TIMES), "Stress [Pa]": np.append(HELD, NONE)}
+    time, stress = np.append(TIMES, starts + TIMES), np.repeat([50.0, 0.0], 30)
+    columns = {"Time [s]": time, "Stress [Pa]": stress}
     columns |= {"Strain [-]": strain} if moved == "strain" else {"Shear rate [1/s]": rate}
     test = export(tmp_path, columns, *title).run
     np.testing.assert_allclose(test.time[30:], 10.0 + TIMES, rtol=1e-12)
@@ -73,7 +72,7 @@ RECOVERIES = {
     "word": (
         {"Time [s]": TIMES, "Strain [-]": 1.2 - RECOVERY}, "Recovery after creep", "Stress: 50 Pa"
     ),
-    "numbers": ({"Time [s]": TIMES, "Stress [Pa]": NONE, "Strain [-]": RECOVERY}, "Sample 7"),
+    "numbers": ({"Time [s]": TIMES, "Stress [Pa]": 0.0, "Strain [-]": RECOVERY}, "Sample 7"),
 }  # fmt: skip
 
 
@@ -104,12 +103,12 @@ def test_what_is_called_a_relaxation_is_one_though_its_strain_is_noisy(tmp_path,
     np.testing.assert_allclose(float(test.metadata["step_strain"]), 0.1, rtol=0.02)
 
 
-AT_A_RATE = {"Time [s]": TIMES, "Shear rate [1/s]": 0 * TIMES + 0.3, "Shear stress [Pa]": STARTED}
+AT_A_RATE = {"Time [s]": TIMES, "Shear rate [1/s]": 0.3, "Shear stress [Pa]": STARTED}
 CONTRADICTIONS = {
     "Test type: Relaxation": (AT_A_RATE, "the strain is not held"),
     "Creep test": (AT_A_RATE, "the rate is held"),
     "Start-up of shear": (
-        {"Time [s]": TIMES, "Stress [Pa]": HELD, "Shear rate [1/s]": RATE}, "the stress is held"
+        {"Time [s]": TIMES, "Stress [Pa]": 50.0, "Shear rate [1/s]": RATE}, "the stress is held"
     ),
 }  # fmt: skip
 
@@ -172,7 +171,7 @@ TENSIONS = {
 @pytest.mark.parametrize("case", TENSIONS)
 def test_tension_is_no_shear_whichever_of_its_words_says_so(tmp_path, case):
     above, rate, stress = TENSIONS[case]
-    test = export(tmp_path, {"Time [s]": TIMES, rate: 0 * TIMES + 0.3, stress: STARTED}, *above).run
+    test = export(tmp_path, {"Time [s]": TIMES, rate: 0.3, stress: STARTED}, *above).run
     assert test.flow == "uniaxial"
     np.testing.assert_allclose(test.rate, 0.3)
 

@@ -16,10 +16,8 @@ from independent import (
 )
 from independent.noise import white
 from independent.sweeps import first_harmonic, oscillating
-from noisy_runs import run_at
 from vectors import sweep_of, vector_of
 
-import discover as dc
 from discover import protocols
 from discover.dataset import Dataset, Run
 from discover.effects import make_effect, named_effects
@@ -228,28 +226,3 @@ def test_where_no_flow_turns_damping_by_strain_is_wagners_law(protocol, flow):
     ours = model.predict(theta, make_batch([run], strain_step=0.02))[0]
     # both are of second order or better in steps of 0.02
     np.testing.assert_allclose(ours, stress, atol=2e-4 * np.max(stress))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("material", "name"),
-    [(INTEGRAL, "strain_damping"), (Giesekus(0.3, **SCALE), "giesekus_mobility")],
-    ids=["K-BKZ", "Giesekus"],
-)
-def test_a_loop_names_damping_by_strain_where_it_is_and_not_elsewhere(material, name):
-    lot, runs = np.random.default_rng(3), []
-    for rate in (0.5, 2.0, 4.0):
-        stress = material.respond(start_up(rate), DAMPED_TIMES).sigma12
-        stress = stress + 0.02 * np.max(stress) * lot.standard_normal(len(DAMPED_TIMES))
-        runs.append(run_at(rate, DAMPED_TIMES, stress, f"at {rate:g}"))
-    loop = dc.close_loop(
-        dc.Dataset("start-ups", tuple(runs)), dc.Fluid(dc.make_law("ucm"), MODULUS, TIME),
-        effects=["strain_damping", "giesekus_mobility", "thixotropy"], max_effects=1,
-        explanations=1,
-    )  # fmt: skip
-    (stage,) = loop.stages
-    assert stage.effect == name
-    assert loop.verdict == "effects_added"
-    (found,) = stage.parameters.values()
-    low, high = found.ci95
-    assert low < {"strain_damping": DAMPING, "giesekus_mobility": 0.3}[name] < high

@@ -72,8 +72,7 @@ def reference(name, gradient):
     law = CASES[name][1]
     # Moore's structure is broken by the shear rate alone, as a number or as a flow's intensity
     rate = gradient if isinstance(law, Structured) else gradient[0, 1]
-    found = followed(law.change, law.rest(), rate, TIMES, rtol=1e-10, atol=1e-10)
-    return np.array([law.stress(y, rate) for y in found])
+    return law.held(rate, TIMES, 1e-10)
 
 
 def integrated(module, gradient):
@@ -225,20 +224,6 @@ def test_rheotool_a_simulation_of_one_mode_and_a_network_are_refused_in_words():
 def test_what_is_no_state_is_refused(effect, values, said):
     with pytest.raises(InputError, match=said):
         StatePart(effect, values)
-
-
-EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
-
-
-def test_one_parameter_with_two_values_keeps_both():
-    terms = tuple(LawTerm(EXPONENTIAL, c, {"epsilon": e}) for c, e in ((1.0, 0.1), (0.5, 0.3)))
-    stress = jnp.asarray([0.7, 0.1, 0.2, 0.4])
-    trace = 1.0
-    wanted = (np.expm1(0.1 * trace) + 0.5 * np.expm1(0.3 * trace)) * np.asarray(stress)
-    extra = Equation(terms).law().extra_term(stress, jnp.zeros(4))
-    np.testing.assert_allclose(extra, wanted, rtol=1e-12)
-    assert r"\epsilon = 0.1" in Equation(terms).latex()
-    assert r"e^{0.3 " in Equation(terms).latex()
 
 
 WI = 3.0

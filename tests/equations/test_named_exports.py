@@ -10,14 +10,14 @@ import re
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import PomPom, authors
+from independent import StressLaw
 from independent.homogeneous import UNIT
+from independent.named import material
 from readers import (
     by_json,
     by_python,
     by_rheotool,
     by_sympy,
-    followed,
     in_ufl,
     integrated,
     module_of,
@@ -41,7 +41,6 @@ from discover.equations.spelling.markup import law_element
 from discover.errors import InputError
 from discover.laws import LAWS, make_law
 from discover.laws.registry import starting_values
-from discover.laws.textbook.pom_pom import _FADES
 from tensor_library import LawTerm
 
 MODULUS, TIME = (40.0, 5.0), (0.3, 1.5)
@@ -75,29 +74,21 @@ def equation(name, constants=None):
 
 
 def reference(name, gradient):
-    total = 0.0
-    for g, time, c in zip(MODULUS, TIME, CONSTANTS[name], strict=True):
-        if name in OF_STRESS:
-            total = total + g * authors.stress(getattr(authors, name), c, gradient, TIMES, time)
-            continue
-        drag_strain = name == "pom_pom_drag_strain"
-        law = PomPom(c["q"], c["stretch_time_ratio"] * time, g, time, drag_strain, _FADES)
-        states = followed(law.change, law.rest(), gradient, TIMES, rtol=1e-9, atol=1e-11)
-        total = total + np.array([law.stress(y, 0.0) for y in states])
-    return total
+    modes = zip(CONSTANTS[name], MODULUS, TIME, strict=True)
+    return sum(material(name, *mode).held(gradient, TIMES) for mode in modes)
 
 
 def by_name(text):
-    """The name and the constants; the equation is the authors' in the stress, by A = I + σ."""
+    """The name and the constants; the equation is the authors', in σ or in A = I + σ/G."""
     content = json.loads(text)["named"]
-    law = getattr(authors, content["law"])
 
     def rates(k, stress, y, gradient):
-        assert content["law"] != "rolie_poly_fene"  # where σ is not A − I
-        scaled, s = gradient * TIME[k], stress / MODULUS[k]
-        a = np.eye(3) + s
-        change = scaled @ a + a @ scaled.T + law(a, scaled, **content["constants"][k])
-        return MODULUS[k] / TIME[k] * change, y
+        assert content["law"] != "rolie_poly_fene"  # where σ is not G (A − I)
+        law = material(content["law"], content["constants"][k], MODULUS[k], TIME[k])
+        if isinstance(law, StressLaw):
+            return law.stress_change(stress, gradient), y
+        change = law.change(np.eye(3) + stress / MODULUS[k], gradient)
+        return MODULUS[k] * change.reshape(3, 3), y
 
     return rates
 
@@ -156,10 +147,11 @@ def test_a_sum_of_terms_flows_as_its_law_in_every_mode_and_in_the_solvent(form):
         found = integrated(rates(text), gradient, TIMES) + solvent(text) * rate
 
     def off(**constants):
-        law = authors.ptt_exponential_non_affine
-        modes = zip(MODULUS, TIME, strict=True)
-        stress = sum(g * authors.stress(law, constants, gradient, TIMES, t) for g, t in modes)
-        wanted = stress + SOLVENT * rate
+        modes = (
+            material("ptt_exponential_non_affine", constants, *mode)
+            for mode in zip(MODULUS, TIME, strict=True)
+        )
+        wanted = sum(mode.held(gradient, TIMES) for mode in modes) + SOLVENT * rate
         return np.max(np.abs(found - wanted)) / np.max(np.abs(wanted))
 
     assert off(**TOGETHER) < 1e-5

@@ -227,12 +227,15 @@ def test_a_sum_without_its_brackets_is_another_law():
     assert not agree(extra_by_latex(wrong), spelled.extra, 0.1)
 
 
-def test_values_of_an_inner_parameter_are_read_back_also_where_nobody_gave_one():
+def test_values_of_an_inner_parameter_are_kept_and_read_back_also_where_nobody_gave_one():
     name = "(exp(epsilon*tr(sigma))-1)*sigma"
     for values in ((0.3, -0.2), (-0.2, 0.3), (2e-5, -3e-5), (None,)):
         terms = tuple(LawTerm(name, 1.0, {"epsilon": e} if e else {}) for e in values)
         wanted = [sum(np.expm1((e or 0.25) * np.trace(s)) for e in values) * s for s, _ in STATES]
         assert agree(extra_by_latex(law_line(Equation(terms))), np.array(wanted))
+        law = Equation(terms).law()
+        found = [law.extra_term(*map(jnp.asarray, state)) for state in STATES]
+        assert None in values or agree(found, np.array(wanted))
 
 
 def test_equations_tex_writes_what_latex_writes():

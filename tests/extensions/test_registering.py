@@ -10,6 +10,7 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import discover as dc
+import tensor_library as tl
 from discover.dataset.importing import IMPORTERS, Block, register_importer
 from discover.effects.base import AbstractEffect, EffectParameter, SignalEffect
 from discover.effects.registry import EFFECTS, make_effect, named_effects
@@ -24,16 +25,7 @@ from discover.loop.task import candidates_of
 from discover.programs.store import digest_of
 from discover.study.data import load_study_data, parse_study
 from discover.study.declared_model import declared_model
-from tensor_library import (
-    CLOSED_FORMS,
-    ClosedForm,
-    LawTerm,
-    build_library,
-    parse_term,
-    register_closed_form,
-    square,
-    trace,
-)
+from tensor_library import trace
 
 
 class SteepLaw(dc.AbstractConstitutiveLaw):
@@ -177,7 +169,7 @@ def test_what_is_no_effect_is_refused_and_a_law_knows_its_name_and_parameters():
 
 def test_a_law_of_a_function_is_the_law_that_is_built_in(registered):
     def mobility(stress, rate, alpha):
-        return alpha * square(stress)
+        return alpha * tl.square(stress)
 
     dc.register_law("own_mobility", extra_term=mobility, parameters={"alpha": (0.0, 1.0)})
     own, built_in = (dc.make_law(n, {"alpha": 0.3}) for n in ("own_mobility", "giesekus"))
@@ -212,7 +204,7 @@ def test_columns_of_a_block_have_one_length_and_a_gap_is_an_empty_cell():
             Block.of(wrong)
 
 
-FORM = ClosedForm(
+FORM = tl.ClosedForm(
     "levelling", "(tr(sigma)/sqrt(1+(mu*tr(sigma))^2))", "mu", 0.5, (1e-3, 10.0),
     lambda trace, mu: trace / jnp.sqrt(1.0 + (mu * trace) ** 2), 4, "this test",
     lambda trace, mu: trace / sympy.sqrt(1 + (mu * trace) ** 2),
@@ -221,14 +213,14 @@ FORM = ClosedForm(
 
 @pytest.fixture
 def form():
-    yield register_closed_form(FORM)
-    del CLOSED_FORMS[FORM.name]
+    yield tl.register_closed_form(FORM)
+    del tl.CLOSED_FORMS[FORM.name]
 
 
 def test_every_notation_writes_the_same_function(form, tmp_path):
     name = f"{form.spelling}*sigma"
-    assert parse_term(name).name == name
-    equation = Equation((LawTerm(name, 0.8, {"mu": 0.3}),))
+    assert tl.parse_term(name).name == name
+    equation = Equation((tl.LawTerm(name, 0.8, {"mu": 0.3}),))
     stress, rate = jnp.diag(jnp.array([2.0, -0.5, 0.25])), jnp.zeros((3, 3))
     wanted = np.asarray(equation.law().extra_term(stress, rate))
     np.testing.assert_allclose(wanted[0, 0], 0.8 * 1.75 / np.sqrt(1 + (0.3 * 1.75) ** 2) * 2.0)
@@ -254,10 +246,10 @@ def test_every_notation_writes_the_same_function(form, tmp_path):
 
 
 def test_a_program_with_the_form_is_not_kept_for_another_process(form):
-    library = build_library(tensors=["sigma"], closed_forms=["levelling"])
+    library = tl.build_library(tensors=["sigma"], closed_forms=["levelling"])
     assert digest_of(library) is None
     # negative control: one with a form of this package is
-    assert digest_of(build_library(tensors=["sigma"], closed_forms=["exp"])) is not None
+    assert digest_of(tl.build_library(tensors=["sigma"], closed_forms=["exp"])) is not None
 
 
 @pytest.mark.parametrize(
@@ -277,5 +269,5 @@ def test_a_program_with_the_form_is_not_kept_for_another_process(form):
 )
 def test_a_form_that_cannot_be_used_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
-        register_closed_form(replace(FORM, **change))
-    assert "levelling" not in CLOSED_FORMS
+        tl.register_closed_form(replace(FORM, **change))
+    assert "levelling" not in tl.CLOSED_FORMS

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import run
 from field import Answer, judged, truth, worst_errors
-from independent import Giesekus, JohnsonSegalman, UpperConvectedMaxwell
-from independent.homogeneous import GiesekusFluid
+from independent import JohnsonSegalman, UpperConvectedMaxwell
 
 
 def test_a_law_is_judged_by_what_it_predicts_unseen_and_running_away_is_the_largest_error():
@@ -40,12 +39,6 @@ def test_extension_from_rest_is_the_closed_form(slip):
     closed = component(2.0 * carried, 2.0 * rate) - component(-carried, -rate)
     law = JohnsonSegalman(slip) if slip else UpperConvectedMaxwell()
     np.testing.assert_allclose(law.pull(rate, times), closed, atol=1e-7)  # integrated to 1e-9
-
-
-def test_two_simulators_agree_in_extension():
-    times = np.linspace(0.1, 3.0, 16)
-    other = GiesekusFluid((1.0,), (1.0,), 0.3).recorded("uniaxial", lambda _: 1.0, times)
-    np.testing.assert_allclose(Giesekus(0.3).pull(1.0, times), other, atol=1e-6)
 
 
 def test_a_case_that_is_kept_is_not_run_again_and_is_in_the_table(tmp_path, capsys):

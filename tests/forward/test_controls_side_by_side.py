@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from in_continuous_time import ContinuousFluid
+from fluids_with_effects import effects_in, fluid_with
 from independent.homogeneous import UNIT, GiesekusFluid
-from independent.sweeps import giesekus_modulus
+from independent.sweeps import giesekus_modulus, modulus_of, strain_at
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from vectors import sweep_of, vector_of, vectors_of_each
@@ -21,6 +21,7 @@ from discover.protocols.protocol import in_flow
 
 MODULI, TIMES, MOBILITY, SOLVENT = np.array([60.0, 20.0]), np.array([0.1, 2.0]), 0.3, 1.0
 DECLARED = DeclaredModel.maxwell(MODULI, TIMES, solvent_viscosity=SOLVENT)
+MODES = list(zip(MODULI.tolist(), TIMES.tolist(), strict=True))
 
 
 def model_with(names, declared=DECLARED):
@@ -57,28 +58,23 @@ def in_creep():
 def by_scipy(kind):
     """Return strain, N1 and N2: what the solvent is left with decides the rate."""
     unit, trouton = UNIT[kind], {"shear": 1.0, "uniaxial": 3.0}[kind]
+    law = fluid_with({"giesekus_mobility": [MOBILITY]}, MODES)
 
-    def rate_of(t, modes):
-        total = modes.sum(axis=0)
+    def rate_of(t, state):
+        total = law.stress(state, 0.0)
         seen = total[0, 1] if kind == "shear" else total[0, 0] - total[1, 1]
         return (wave(t) - seen) / (SOLVENT * trouton)
 
     def slope(t, y):
-        modes = y[1:].reshape(-1, 3, 3)
-        rate = rate_of(t, modes)
-        gradient, out = rate * unit, [[rate]]
-        for stress, modulus, time in zip(modes, MODULI, TIMES, strict=True):
-            made = modulus * (gradient + gradient.T) + gradient @ stress + stress @ gradient.T
-            out.append(np.ravel(made - (stress + MOBILITY / modulus * stress @ stress) / time))
-        return np.concatenate(out)
+        rate = rate_of(t, y[1:])
+        return np.append(rate, law.change(y[1:], rate * unit))
 
-    start = np.zeros(1 + 9 * MODULI.size)
+    start = np.append(0.0, law.rest())
     found = solve_ivp(slope, (0.0, WHEN[-1]), start, "LSODA", WHEN, rtol=1e-8, atol=1e-8).y.T
     values = []
     for t, y in zip(WHEN, found, strict=True):
-        modes = y[1:].reshape(-1, 3, 3)
-        rate = rate_of(t, modes) * unit
-        total = modes.sum(axis=0) + SOLVENT * (rate + rate.T)
+        rate = rate_of(t, y[1:]) * unit
+        total = law.stress(y[1:], 0.0) + SOLVENT * (rate + rate.T)
         values.append([y[0], total[0, 0] - total[1, 1], total[1, 1] - total[2, 2]])
     return np.array(values)
 
@@ -96,21 +92,35 @@ def test_strains_and_normal_stresses_in_creep_are_those_of_full_tensors(in_creep
         assert np.max(np.abs(off - expected) / largest) > 2e-3
 
 
+def with_inertia(inertia):
+    """Return the strain of Maxwell modes and a solvent behind I γ̈: all of it is linear."""
+
+    def change(t, y):  # stresses of the modes, the rate, the strain
+        own, rate = y[:2], y[2]
+        left = wave(t) - np.sum(own) - SOLVENT * rate
+        return [*(MODULI * rate - own / TIMES), left / inertia, rate]
+
+    return solve_ivp(change, (0.0, WHEN[-1]), np.zeros(4), "Radau", WHEN, rtol=1e-8).y[3]
+
+
 def test_effects_in_creep_follow_their_equations(in_creep):
     model, batch, thetas = in_creep
     found = model.predictions(thetas, batch)
-    for row, run in enumerate(CREEP):
-        any_of_them = ContinuousFluid(model, thetas[0], run.protocol.kinematics)
-        for number, theta in enumerate(thetas[1:], start=1):
-            gain, inertia = (
-                float(theta[model.positions(name)[0]]) * (run is CREEP[0])
-                for name in ("stress_gain", "instrument_inertia")
-            )
-            fluid = any_of_them.of(theta)
-            exact = fluid.at_stress(lambda t, gain=gain: wave(t) / (1.0 + gain), inertia, WHEN)
-            # the error of the steps, and of the wave between its samples
-            largest = np.max(np.abs(exact))
-            np.testing.assert_allclose(found[number, row], exact, atol=1e-3 * largest)
+    for strain, theta in zip(found[1:, 0], thetas[1:], strict=True):
+        effects = effects_in(model, theta, IN_CREEP)
+        ((name, (value, *_)),) = effects.items()
+        if name == "instrument_inertia":
+            exact = with_inertia(value)
+        else:
+            given = 1.0 / (1.0 + value) if name == "stress_gain" else 1.0
+            levels = [(0.0, lambda t, given=given: given * wave(t))]
+            exact = strain_at(fluid_with(effects, MODES), levels, SOLVENT, WHEN)
+        if name == "tool_compliance":
+            exact = exact + value * wave(WHEN)
+        if name == "wall_slip":
+            exact = exact + value * 7.5 * (1.0 - np.cos(2.0 * WHEN))  # ∫ 15 sin 2t dt
+        # the error of the steps, and of the wave between its samples
+        np.testing.assert_allclose(strain, exact, atol=1e-3 * np.max(np.abs(exact)))
     # and not because effects do nothing
     largest = np.max(np.abs(found[0, 0]))
     assert np.min(np.max(np.abs(found[1:, 0] - found[0, 0]) / largest, axis=1)) > 1e-7
@@ -173,17 +183,20 @@ def test_a_state_that_no_flow_reaches_is_told_and_spoils_none_beside_it(on_curve
 
 def test_effects_on_flow_curves_are_where_a_start_up_ends(on_curves):
     model, batch, vectors = on_curves
-    found = model.predictions(vectors, batch)
-    long, any_of_them = np.array([100.0]), ContinuousFluid(model, vectors[0])
-    for number, theta in enumerate(vectors):
-        for place in (2, 7, 10):
-            rate = RATES[place]
-            run = Run("long", long, start_up(rate), np.full(1, rate), np.ones(1))
-            # what is still to come after fifty of the longest time, to scipy's tolerance
-            exact = any_of_them.of(theta).recorded(run)
-            np.testing.assert_allclose(found[number, 0, place], exact[0], rtol=1e-5)
+    felt = RATES[[2, 7, 10]]
+    for theta in vectors:
+        effects = {name: 0.0 for name in ON_CURVES}
+        effects |= {n: of[0] for n, of in effects_in(model, theta, ON_CURVES).items()}
+        fluid = fluid_with(effects_in(model, theta, ON_CURVES), MODES, SOLVENT)
+        # what is still to come after fifty of the longest time, to scipy's tolerance
+        stress = np.array([fluid.held(rate, np.array([100.0]))[0, 0, 1] for rate in felt])
+        # the fluid feels the rate of the tool less s σ, and the record has the friction
+        told = (felt + effects["wall_slip"] * stress) / (1.0 + effects["rate_gain"])
+        found = model.predict(theta, make_batch([curve("shear", steady_rates(told), told)]))[0]
+        np.testing.assert_allclose(found, stress + effects["bearing_friction"], rtol=1e-5)
     # and not because effects do nothing
-    assert np.all(np.max(np.abs(found[1:, 0] / found[0, 0] - 1.0), axis=1) > 1e-3)
+    found = model.predictions(vectors, batch)[:, 0]
+    assert np.all(np.max(np.abs(found[1:] / found[0] - 1.0), axis=1) > 1e-3)
 
 
 def test_moduli_and_solvent_of_each_vector_are_those_of_a_model_that_declares_them(on_curves):
@@ -277,17 +290,21 @@ def test_what_gives_way_takes_its_share_of_the_closed_moduli(in_sweeps):
     ],
 )
 def test_what_couples_the_modes_comes_to_where_scipy_ends(trial):
-    model = model_with(("giesekus_mobility", "thixotropy", "wall_slip"))
+    names = "giesekus_mobility", "thixotropy", "wall_slip"
+    model = model_with(names, DeclaredModel.maxwell(MODULI, TIMES))
     strain, frequency = np.array([0.3, 3.0]), np.array([2.0, 1.0])
     theta = vector_of(model, *trial)
     for name, share in trial.items():
         theta[model.positions(name)[0]] *= share
     batch = make_batch(sweep_of(strain, frequency).records)
     (storage, loss), still = model.predict(theta, batch), model.predict(model.zero(), batch)
-    fluid = ContinuousFluid(model, theta)
+    effects = effects_in(model, theta, names)
+    fluid, (slip,) = fluid_with(effects, MODES), effects.get("wall_slip", [0.0])
     # cycles of twenty times what the slowest mode takes to forget the start
-    exact = np.array([fluid.modulus(s, w, int(20.0 * TIMES[1] * w / (2.0 * np.pi)) + 2)
-                      for s, w in zip(strain, frequency, strict=True)])  # fmt: skip
+    exact = np.array([
+        modulus_of(fluid, s, w, int(20.0 * TIMES[1] * w / (2.0 * np.pi)) + 2, slip)
+        for s, w in zip(strain, frequency, strict=True)
+    ])  # fmt: skip
     # the steps of a cycle, and of what slips its first harmonic alone
     np.testing.assert_allclose(storage + 1j * loss, exact, rtol=2e-3)
     assert np.max(np.abs(exact / (still[0] + 1j * still[1]) - 1.0)) > 2e-2

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from independent import authors
-from independent.homogeneous import UNIT
+from independent import UpperConvectedMaxwell, oscillation
+from independent.instruments import Instrument
+from independent.named import material
+from independent.noise import white
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from vectors import vector_of
@@ -142,9 +144,7 @@ def test_heat_and_work_shorten_the_relaxation_times(name):
 
 def test_a_yield_stress_raises_the_steady_stress_as_saramito_says():
     start = predict(yield_stress=0.2)[0]
-    gradient = STEADY * UNIT["shear"]
-    stress = authors.stress(authors.saramito, {"yield_strain": 0.2}, gradient, TIMES, TIME)
-    exact = MODULUS * stress[:, 0, 1]
+    exact = material("saramito", {"yield_strain": 0.2}, MODULUS, TIME).held(STEADY, TIMES)[:, 0, 1]
     np.testing.assert_allclose(start, exact, atol=1e-3 * np.max(exact))
     assert start[-1] > 1.05 * maxwell_in_start_up(MODULUS, TIME)[-1]
 
@@ -152,60 +152,46 @@ def test_a_yield_stress_raises_the_steady_stress_as_saramito_says():
 SLIP, INERTIA, FRICTION = 0.5 / (MODULUS * TIME), 15.0, 20.0
 
 
-def slipping(rate):
-    """Return stress and felt rate at the samples of a Maxwell fluid that slips, by scipy."""
-
-    def slope(stress, commanded):
-        return MODULUS * (commanded - SLIP * stress) - stress / TIME
-
-    stress = integrate(slope, 1, rate)[0]
-    return stress, rate(TIMES) - SLIP * stress
+def recorded(**faults):
+    """Return the record of a Maxwell fluid in the oscillation, on an instrument with faults."""
+    flow = oscillation(*OSCILLATION)
+    return Instrument(**faults).record(UpperConvectedMaxwell(MODULUS, TIME), flow, TIMES)
 
 
 def test_inertia_and_friction_follow_the_tool_and_not_the_fluid_that_slips():
     record = predict(
         wall_slip=SLIP, instrument_inertia=INERTIA, bearing_friction=FRICTION
     )[1]  # fmt: skip
-    stress, felt = slipping(oscillating_rate)
-    amplitude, frequency = OSCILLATION
-    tool = -amplitude * frequency * np.sin(frequency * TIMES)
-    exact = stress + INERTIA * tool + FRICTION * np.sign(oscillating_rate(TIMES))
+    exact = recorded(slip=SLIP, inertia=INERTIA, friction=FRICTION)
     # slip to second order, slopes by central differences, both in steps of 0.1 strain
-    np.testing.assert_allclose(record, exact, atol=0.01 * np.max(np.abs(exact)))
+    np.testing.assert_allclose(record, exact.stress, atol=0.01 * np.max(np.abs(exact.stress)))
     # the control: the rate that the fluid feels would miss by far more
+    felt, stress = exact.felt_rate, exact.true.sigma12
     follows_fluid = stress + INERTIA * np.gradient(felt, TIMES) + FRICTION * np.sign(felt)
-    assert np.sqrt(np.mean((follows_fluid - exact) ** 2) / np.mean(stress**2)) > 0.1
+    assert np.sqrt(np.mean((follows_fluid - exact.stress) ** 2) / np.mean(stress**2)) > 0.1
 
 
 @pytest.mark.parametrize(
-    ("between", "tool"),
+    ("between", "faults"),
     [
-        # a motor that lags moves the tool late: τ x' + x = γ̇ from rest, x' = (γ̇ − x)/τ
-        ({"rate_rise_time": 0.4}, lambda: (oscillating_rate(TIMES) - lagged(0.4)) / 0.4),
+        # a motor that lags moves the tool late
+        ({"rate_rise_time": 0.4}, {"rise_time": 0.4}),
         # a wrong gap does not change what the tool does, and a soft tool moves where it is driven
-        ({"rate_gain": 0.3}, lambda: np.gradient(oscillating_rate(FINE), FINE)[::50]),
-        ({"tool_compliance": 0.004}, lambda: np.gradient(oscillating_rate(FINE), FINE)[::50]),
+        ({"rate_gain": 0.3}, {}),
+        ({"tool_compliance": 0.004}, {}),
     ],
-    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+    ids=lambda value: next(iter(value), ""),
 )
-def test_the_tool_feels_what_is_upstream_of_it_alone(between, tool):
+def test_the_tool_feels_what_is_upstream_of_it_alone(between, faults):
     added = predict(instrument_inertia=INERTIA, **between)[1] - predict(**between)[1]
+    exact = recorded(inertia=INERTIA, **faults).stress - recorded(**faults).stress
     # central differences in steps of 0.08 s, of a rate that begins to rise; one-sided at the end
-    np.testing.assert_allclose(added[:-1], INERTIA * tool()[:-1], atol=0.02 * INERTIA * 2.4)
-
-
-FINE = np.linspace(TIMES[0], TIMES[-1], 50 * (len(TIMES) - 1) + 1)
-
-
-def lagged(tau):
-    return integrate(lambda x, rate: (rate - x) / tau, 1, oscillating_rate)[0]
+    np.testing.assert_allclose(added[:-1], exact[:-1], atol=0.02 * INERTIA * 2.4)
 
 
 def test_a_correction_for_inertia_that_is_too_large_is_found():
-    stress = integrate(lambda y, rate: MODULUS * rate - y / TIME, 1, oscillating_rate)[0]
-    tool = -OSCILLATION[0] * OSCILLATION[1] * np.sin(OSCILLATION[1] * TIMES)
-    noise = 0.01 * np.sqrt(np.mean(stress**2)) * np.random.default_rng(1).normal(size=len(TIMES))
-    run = Run("1", TIMES, FLOWS[1], oscillating_rate(TIMES), stress - 8.0 * tool + noise)
+    stress = white(recorded(inertia=-8.0).stress, 0.01, np.random.default_rng(1))
+    run = Run("1", TIMES, FLOWS[1], oscillating_rate(TIMES), stress)
     name = "instrument_inertia"
     model = AugmentedModel(
         DeclaredModel.maxwell(MODULUS, TIME), [make_effect(name)], data_scales([run])

@@ -127,18 +127,9 @@ def test_every_line_of_the_file_is_a_case_with_records_that_reproduce():
     np.testing.assert_array_equal(one["stress_Pa"], other["stress_Pa"])
 
 
-@pytest.mark.parametrize(
-    ("question", "loop"),
-    [
-        # few candidates are a small program
-        ("close-loop", {"effects": ["giesekus_mobility", "stress_gain", "tool_compliance"]}),
-        pytest.param("close-loop", {}, marks=pytest.mark.slow),
-        pytest.param("compare", {}, marks=pytest.mark.slow),
-    ],
-    ids=["few candidates", "close-loop", "compare"],
-)
-def test_a_dead_sensor_leads_the_whole_program_to_no_claim(question, loop, tmp_path, monkeypatch):
-    monkeypatch.setattr(hostile, "case_named", lambda name: replace(EMPTY, loop=loop))
-    row = ask("hostile", "dead_sensor", question, 0, str(tmp_path), 600.0)
+def test_a_dead_sensor_leads_the_whole_program_to_no_claim(tmp_path, monkeypatch):
+    few = {"effects": ["giesekus_mobility", "stress_gain", "tool_compliance"]}
+    monkeypatch.setattr(hostile, "case_named", lambda name: replace(EMPTY, loop=few))
+    row = ask("hostile", "dead_sensor", "close-loop", 0, str(tmp_path), 600.0)
     assert row["verdict"] not in (*product.CONFIDENT, "fault", "late"), row.get("message")
     assert not row.get("false")

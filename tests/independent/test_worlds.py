@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from calibration import calibration_error, comparison_table, is_right, loop_table, share
 from independent.worlds import FLOWS, NOISES, draw_world, known_flaws, known_laws, unknown_laws
-from run import ask
 
 
 def test_worlds_hold_every_law_flaw_protocol_and_noise():
@@ -135,15 +134,3 @@ OF_DETERMINED = [
 def test_a_table_counts_what_was_said_and_was_so(table, cases, counts):
     for count in counts:
         assert count in table(cases)
-
-
-@pytest.mark.slow
-def test_a_comparison_on_a_sound_maxwell_fluid_is_explained_and_its_bands_hold(tmp_path):
-    found = ask("calibration", "0", "compare", 7, str(tmp_path), 3600.0)
-    assert (found["law"], found["flaw"], found["verdict"]) == ("Maxwell", "sound", "explained")
-    assert found["terms"] == []
-    assert {b["source"] for b in found["bands"]} == {"tensor_sindy", "posterior"}
-    held = [b["inside"] for b in found["bands"] if "inside" in b]
-    assert held
-    assert np.mean(held) > 0.9  # of all samples: of one run in twenty fewer are held
-    assert "found alone: 1 of 1" in comparison_table([found])

@@ -10,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from explained import explain
+from hostile_benches import PlatePlate
 from independent import Giesekus, PhanThienTanner
-from independent.flow import Flow, oscillation, start_up
+from independent.flow import oscillation, start_up
 from independent.folders import write_folder
 from independent.instruments import Instrument
 from independent.noise import white
@@ -115,12 +116,7 @@ BESIDE_PLATES = [
 
 def of_plates(fluid, flow, times):
     """Return what an instrument with plates calls the stress, without noise."""
-    radii, weights = np.polynomial.legendre.leggauss(12)
-    total = 0.0
-    for x, weight in zip((radii + 1) / 2, weights / 2, strict=True):
-        inner = Flow(lambda t, x=x: x * flow.rate(t), lambda t, x=x: x * flow.strain(t), flow.jumps)
-        total = total + 4 * weight * x**2 * Instrument().record(fluid, inner, times).stress
-    return total
+    return PlatePlate(fluid, points=12).respond(flow, times).sigma12
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ follows from steps four times and twice as long (at a given stress, half and a q
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent.authors import rolie_poly, stress, xpp
 from independent.homogeneous import UNIT
 from independent.named import CONSTANTS, material
 from scipy.integrate import solve_ivp
@@ -118,6 +117,10 @@ def measured(law: str, flow: str) -> dict[str, float | None]:
 
 
 KINKED = ("saramito",)
+# chains that retract in 0.02 λ, within a tenth of a step, where exponential methods of fourth order
+# have the third   [Hochbruck & Ostermann 2005, SIAM J. Numer. Anal. 43, 1069]; of chains that
+# retract in λ/4 the order is 4.0, and of these in steps a tenth as long
+STIFF = ("rolie_poly_blend",)
 OF_STRESS = [law for law, constants in CONSTANTS.items() if not make_law(law, constants).variables]
 """Those with variables beside it: below, and `test_rolie_poly_blend.py`."""
 
@@ -172,11 +175,12 @@ def test_every_law_is_its_independent_solution(law):
             continue
         # a kink within a step errs by its second order
         assert found["error"] < (1e-4 if law in KINKED else 2e-5)
-        assert law in KINKED or found["order"] is None or found["order"] > 3.5
+        least = 3.0 if law in STIFF else 3.5
+        assert law in KINKED or found["order"] is None or found["order"] > least
 
 
-ROLIE_POLY = rolie_poly, {"stretch_time_ratio": 0.1, "beta": 0.7}
-XPP = xpp, {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1}
+ROLIE_POLY = "rolie_poly", {"stretch_time_ratio": 0.1, "beta": 0.7}
+XPP = "xpp", {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1}
 
 
 @pytest.mark.parametrize(
@@ -191,14 +195,13 @@ def test_fast_modes_of_a_retracting_law_need_no_small_steps(law, constants, kind
     """The trace of the fastest mode relaxes within 1e-5 of a step."""
     modulus, time = np.array([1000.0, 300.0, 50.0]), np.array([1e-4, 1e-2, 3.0])
     times = np.linspace(0.1, 4.0, 40)
-    declared = DeclaredModel.named(law.__name__, constants, modulus, time)
+    declared = DeclaredModel.named(law, constants, modulus, time)
     model = AugmentedModel(declared, [])
     run = Run("run", times, in_flow(start_up(rate), kind), np.full(40, rate), np.ones(40))
     found = model.predict(model.zero(), make_batch([run]))[0]
     gradient = rate * UNIT[kind]
-    exact = sum(
-        g * stress(law, constants, gradient, times, t) for g, t in zip(modulus, time, strict=True)
-    )
+    modes = zip(modulus, time, strict=True)
+    exact = sum(material(law, constants, *mode).held(gradient, times) for mode in modes)
     wanted = exact[:, 0, 1] if kind == "shear" else exact[:, 0, 0] - exact[:, 1, 1]
     # what the fixed steps of a fit cost, 1e-6 of other laws; a retraction is ten times as fast
     np.testing.assert_allclose(found, wanted, atol=2e-4 * np.max(np.abs(wanted)))

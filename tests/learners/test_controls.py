@@ -13,16 +13,11 @@ from independent.noise import white
 from noisy_runs import run_at, start_ups
 
 import discover as dc
+from discover import protocols
 from discover.learners.settings import as_runs, known_part
 from discover.learners.tbnn_ude import estimator as of_network
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import without_network
-from discover.protocols import (
-    after_alternation,
-    oscillatory_shear,
-    shear_rates,
-    step_rates,
-)
 from discover.protocols.control import steady_rates
 from tensor_library.library import build_library
 
@@ -49,21 +44,6 @@ def test_the_network_is_told_of_steady_states_as_their_differences_say():
     assert np.all(np.isfinite(along.states))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("known", [0.0, MOBILITY])
-def test_a_flow_curve_alone_gives_the_mobility_that_made_it_and_nothing_that_is_known(known):
-    base = dc.Fluid(dc.make_law("giesekus", {"alpha": known}), 1.0, 1.0)
-    sindy = dc.TensorSINDy(base=base, library=LIBRARY).fit([flow_curve(NOISE)])
-    terms = {term.term: term for term in sindy.terms_}
-    if known:  # the control
-        assert not terms
-        return
-    assert list(terms) == ["sigma.sigma"]
-    low, high = terms["sigma.sigma"].ci95
-    assert low <= MOBILITY <= high
-    assert high - low < 0.05
-
-
 STIFF, SLOW_TIME, FREQUENCY = 100.0, 20.0, 1.0
 SLOWLY = dc.Fluid(modulus=STIFF, relaxation_time=SLOW_TIME)
 PERIOD = 2.0 * np.pi / FREQUENCY
@@ -71,13 +51,13 @@ PERIOD = 2.0 * np.pi / FREQUENCY
 
 def swing(strain, samples=65, cycles=None, noise=0.0):
     times = np.linspace(0.0, PERIOD, samples)
-    rate = oscillatory_shear(strain * FREQUENCY, FREQUENCY)
-    protocol = after_alternation(rate, PERIOD, times)
+    rate = protocols.oscillatory_shear(strain * FREQUENCY, FREQUENCY)
+    protocol = protocols.after_alternation(rate, PERIOD, times)
     flow = oscillation(strain * FREQUENCY, FREQUENCY)  # after so many cycles from rest, by scipy
     later = (45 if cycles is None else cycles) * PERIOD + times
     stress = Giesekus(MOBILITY, STIFF, SLOW_TIME).respond(flow, later).sigma12
     stress = white(stress, noise, np.random.default_rng(int(10 * strain)))
-    return dc.Run(f"strain {strain:g}", times, protocol, shear_rates(rate, times), stress)
+    return dc.Run(f"strain {strain:g}", times, protocol, protocols.shear_rates(rate, times), stress)
 
 
 def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
@@ -136,7 +116,7 @@ def records(noise=0.01, seed=0):
         times = np.append(np.geomspace(2e-3, 1.9, 15), 2.0 + np.geomspace(2e-3, 60.0, 40))
         exact = law.respond(steps(*flow), times).sigma12
         rates, noisy = np.where(times < 2.0, 1.0, rate), white(exact, noise, generator)
-        runs.append(dc.Run(f"to_{rate:g}", times, step_rates(*flow), rates, noisy))
+        runs.append(dc.Run(f"to_{rate:g}", times, protocols.step_rates(*flow), rates, noisy))
     return runs
 
 

@@ -91,14 +91,6 @@ def test_correlated_noise_seldom_brings_in_a_term():
     assert all(15 < worth(model) < 80 for model in models if not model.terms_)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_every_sample_counts_in_white_noise(seed):
-    model = fitted(0.0, seed)
-    assert worth(model) == len(RATES) * len(TIMES)
-    assert model.terms_ == ()
-
-
 @pytest.mark.parametrize("learner", [dc.TensorSINDy(), dc.TBNNUDE()])
 def test_a_record_that_is_zero_throughout_is_refused(learner):
     records = {"a.csv": -np.expm1(-TIMES), "b.csv": 0.0 * TIMES}

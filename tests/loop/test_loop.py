@@ -11,12 +11,12 @@ import pytest
 from compilations import compilations
 from independent.noise import white
 
-from discover.dataset import Dataset, Run, load_dataset, relaxation_spectrum
+from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.forward.side_by_side import code
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.loop import DeclaredModel, run_loop
-from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
+from discover.protocols import oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 10.0, 120)
@@ -35,20 +35,13 @@ EFFECTS = (
 OTHERS = ("giesekus_mobility", "ptt_exponential", "transducer_lag", "wall_slip")
 
 
-def make_dataset(law, noise=0.01, rise=0.0, seed=0):
+def make_dataset(law, noise=0.01, seed=0):
     fluid = Fluid(law, jnp.asarray(100.0), jnp.asarray(1.0))
     generator = np.random.default_rng(seed)
     runs = []
     for name, flow in FLOWS.items():
-        felt = flow
-        rate = shear_rates(flow, TIMES)
-        if rise and name != "laos":
-            dense = np.linspace(0.0, 10.0, 2001)
-            felt = measured_rate(dense, rate[0] * (1 - np.exp(-dense / rise)))
-        elif rise:
-            continue  # the lagged oscillation is not needed to find the lag
-        stress = white(simulate(fluid, felt, TIMES).shear_stress, noise, generator)
-        runs.append(Run(name, TIMES, flow, rate, stress))
+        stress = white(simulate(fluid, flow, TIMES).shear_stress, noise, generator)
+        runs.append(Run(name, TIMES, flow, shear_rates(flow, TIMES), stress))
     return Dataset("made", tuple(runs))
 
 
@@ -108,17 +101,6 @@ def test_a_planted_mobility_is_found_named_and_predicts_the_held_out_run(planted
     np.testing.assert_allclose(alone, record.predicted[-1], atol=5e-3 * np.max(alone))
 
 
-@pytest.mark.slow
-def test_a_planted_rise_time_is_found_or_its_declared_alias():
-    result = loop(make_dataset(UpperConvectedMaxwell(), rise=0.3))
-    first = result.stages[0]
-    assert "rate_rise_time" in (first.effect, *first.aliases)
-    assert first.effect == "rate_rise_time"
-    assert first.parameters["tau"].value == pytest.approx(0.3, rel=0.05)
-    assert first.parameters["tau"].unit == "s"
-    assert result.verdict == "effects_added"
-
-
 def test_the_json_follows_the_contract_and_records_hold_what_pictures_need(planted_mobility):
     contents = json.loads(json.dumps(planted_mobility.to_json(), allow_nan=False))
     wanted = {"verdict", "error_before", "error_after", "noise_floor", "stages", "remaining"}
@@ -167,31 +149,6 @@ def test_held_out_stresses_do_not_enter_the_fit(planted_mobility):
 def test_bad_input_is_refused_with_one_message(options, message):
     with pytest.raises(InputError, match=message):
         loop(make_dataset(UpperConvectedMaxwell()), **options)
-
-
-MELT_CANDIDATES = [
-    "rate_rise_time", "transducer_lag", "time_delay", "stress_gain", "stress_offset",
-    "tool_compliance", "wall_slip", "giesekus_mobility", "ptt_linear", "tr(sigma)*gammadot",
-]  # fmt: skip
-
-
-@pytest.mark.slow
-def test_one_instrument_effect_cuts_the_held_out_error_of_the_melt_fourfold(measured_data):
-    dataset = load_dataset(measured_data / "pi95k-startup", clock_factor="time_factor")
-    spectrum = relaxation_spectrum(dataset.linear_sweep)
-    result = run_loop(
-        dataset,
-        DeclaredModel.maxwell(
-            spectrum.modulus, spectrum.relaxation_time, linear_error=spectrum.relative_error
-        ),
-        held_out=[name for name in dataset.names if "Tm23" in name],
-        # the study has the whole dictionary; ten candidates here, for the time that tests may take
-        effects=MELT_CANDIDATES, max_effects=1, explanations=1, strain=(0.0, 0.4),
-    )  # fmt: skip
-    (stage,) = result.stages
-    assert stage.kind in ("kinematic", "signal")
-    assert len(stage.parameters) == 1
-    assert result.error_after.held_out < 0.25 * result.error_before.held_out
 
 
 def test_one_start_up_gives_the_law_though_modulus_and_time_are_unknown_too():

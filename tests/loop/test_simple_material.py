@@ -10,7 +10,6 @@ import discover as dc
 from discover.answer.simple_material import SimpleMaterial, material_of
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
-from discover.inference.engine import simple_materials
 from discover.inference.engine.closed_forms import recorded
 from discover.inference.engine.simple_materials import SimpleFit
 from discover.loop import run_loop
@@ -107,25 +106,6 @@ def test_a_giesekus_flow_curve_is_no_yield_stress(alpha):
     for rates in (RATES, np.geomspace(1.0, 1000.0, 25)):
         curve = flow_curve(lambda r: giesekus(r, alpha), rates)
         assert material_in([curve], modulus=100.0) is None
-
-
-def test_few_predictions_say_that_nothing_simple_explains_what_relaxes(monkeypatch):
-    asked = []
-    plain = simple_materials._ClosedForm.predict
-
-    def predict(self, thetas, moduli=None):
-        asked.append(len(thetas))
-        return plain(self, thetas, moduli)
-
-    monkeypatch.setattr(simple_materials._ClosedForm, "predict", predict)
-    runs = start_ups(lambda t, rate: 50.0 * rate * (1.0 - np.exp(-t)))
-    assert material_in(runs, 50.0) is None
-    bounded = sum(asked)
-    asked.clear()
-    monkeypatch.setattr(simple_materials, "_FAR", np.inf)
-    assert material_in(runs, 50.0) is None
-    # those that begin alone are a dozen; in all rounds it was thirty times as many
-    assert 3 * bounded < sum(asked)
 
 
 def test_moduli_at_one_frequency_are_no_solid():

@@ -5,28 +5,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.programs.lanes import (
-    LANES,
-    Arithmetic,
-    Translation,
-    Writing,
-    callable_of,
-)
+from discover.programs import lanes
 
 SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e-320, -1.0, 800.0])
 
 
 def in_lanes(function, *arguments):
     """Return a function of numbers for eight sets of them, by machine code."""
-    w = Writing((), ("x", "y"), ("x", "y"), ())
+    w = lanes.Writing((), ("x", "y"), ("x", "y"), ())
     given = [w.load("x", i) for i in range(len(arguments))]
-    translation = Translation(Arithmetic(w.builder))
+    translation = lanes.Translation(lanes.Arithmetic(w.builder))
     found = translation(function, *given)
     leaves = [value for leaf in jax.tree.leaves(found) for value in np.atleast_1d(leaf).flat]
     for i, value in enumerate(leaves):
-        w.store(Arithmetic(w.builder).lanes(value), "y", i)
-    x, y = np.array(arguments, dtype=float), np.empty((len(leaves), LANES))
-    callable_of(w.compiled(), 0, 2)(x.ctypes.data, y.ctypes.data)
+        w.store(lanes.Arithmetic(w.builder).lanes(value), "y", i)
+    x, y = np.array(arguments, dtype=float), np.empty((len(leaves), lanes.LANES))
+    lanes.callable_of(w.compiled(), 0, 2)(x.ctypes.data, y.ctypes.data)
     assert translation.calls is not None  # they live as long as the code
     return y if len(leaves) > 1 else y[0]
 
@@ -50,7 +44,7 @@ def in_lanes(function, *arguments):
     ],
 )
 def test_functions_have_the_digits_of_numpy(of_jax, of_numpy, low, high):
-    x = np.linspace(low, high, LANES)
+    x = np.linspace(low, high, lanes.LANES)
     # a few roundings; a power loses those of its exponent, here up to 30
     np.testing.assert_allclose(in_lanes(of_jax, x), of_numpy(x), rtol=2e-14)
 
@@ -87,7 +81,7 @@ def test_branches_by_numbers_are_taken_lane_by_lane():
     def function(x):
         return jax.lax.cond(x > 0.0, lambda v: jnp.sqrt(v), lambda v: 1.0 - v, x)
 
-    x = np.linspace(-2.0, 2.0, LANES)
+    x = np.linspace(-2.0, 2.0, lanes.LANES)
     wanted = np.where(x > 0.0, np.sqrt(np.abs(x)), 1.0 - x)
     np.testing.assert_allclose(in_lanes(function, x), wanted, rtol=1e-15)
 
@@ -97,7 +91,7 @@ def test_what_is_not_known_in_lanes_is_computed_by_jax_for_each_of_them():
         reached = jax.lax.while_loop(lambda v: v < 1.0, lambda v: 2.0 * v, x)
         return reached, jnp.stack([x, jnp.sin(y)]), y > reached
 
-    x, y = np.linspace(0.1, 2.0, LANES), np.linspace(0.0, 3.0, LANES)
+    x, y = np.linspace(0.1, 2.0, lanes.LANES), np.linspace(0.0, 3.0, lanes.LANES)
     reached = x * 2.0 ** np.maximum(np.ceil(-np.log2(x)), 0.0)
     wanted = [reached, x, np.sin(y), y > reached]
     np.testing.assert_allclose(in_lanes(doubled, x, y), wanted, rtol=1e-15)
@@ -105,13 +99,13 @@ def test_what_is_not_known_in_lanes_is_computed_by_jax_for_each_of_them():
 
 def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
     rng = np.random.default_rng(0)
-    entries, right = rng.normal(size=(9, LANES)), rng.normal(size=(3, LANES))
+    entries, right = rng.normal(size=(9, lanes.LANES)), rng.normal(size=(3, lanes.LANES))
     entries[0, ::2] = 0.0  # the first pivot is none in half of the lanes
 
     def solved(*values):
         return jnp.linalg.solve(jnp.stack(values[:9]).reshape(3, 3), jnp.stack(values[9:]))
 
     found = in_lanes(solved, *entries, *right)
-    matrices = np.moveaxis(entries.reshape(3, 3, LANES), -1, 0)
+    matrices = np.moveaxis(entries.reshape(3, 3, lanes.LANES), -1, 0)
     exact = np.linalg.solve(matrices, right.T[:, :, None])[:, :, 0].T
     np.testing.assert_allclose(found, exact, rtol=1e-11)

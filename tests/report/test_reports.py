@@ -22,13 +22,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows, learner_lines
 from discover.report.page import safe_name
-from discover.report.plots.comparison import (
-    curves,
-    error_map_picture,
-    flow_picture,
-    third_harmonic,
-    training_picture,
-)
+from discover.report.plots import comparison as plots
 from discover.report.plots.style import SPARSE, style_sheet
 from discover.report.wording import percent
 from discover.study import RunFolder, parse_study
@@ -146,9 +140,9 @@ def test_every_picture_is_well_formed_named_in_every_curve_and_has_a_text_altern
 
 
 def test_a_picture_is_the_same_bytes_every_time_and_follows_light_and_dark(comparison):
-    first, second = (flow_picture(comparison, comparison.judged[0]).svg for _ in range(2))
+    first, second = (plots.flow_picture(comparison, comparison.judged[0]).svg for _ in range(2))
     assert first == second
-    drawn = training_picture(comparison)
+    drawn = plots.training_picture(comparison)
     text = drawn.adaptive
     ElementTree.fromstring(text.split("?>", 1)[1].split(">", 1)[1])
     assert "prefers-color-scheme: dark" in text
@@ -162,14 +156,14 @@ def test_a_curve_that_ran_away_is_left_out(comparison):
     outcome = comparison.outcomes["tbnn_ude"]
     lost = replace(outcome, predictions={**outcome.predictions, flow.key: None})
     without = replace(comparison, outcomes={**comparison.outcomes, "tbnn_ude": lost})
-    labels = [label for label, _, _ in curves(without, flow)]
+    labels = [label for label, _, _ in plots.curves(without, flow)]
     assert "neural network" not in labels
     assert "sparse regression" in labels
-    assert "neural network" not in flow_picture(without, flow).svg
+    assert "neural network" not in plots.flow_picture(without, flow).svg
     everywhere = dict.fromkeys(outcome.predictions)
     none = replace(outcome, predictions=everywhere)
     without = replace(comparison, outcomes={**comparison.outcomes, "tbnn_ude": none})
-    assert texts_of(error_map_picture(without).svg).count("–") == 3 * 16
+    assert texts_of(plots.error_map_picture(without).svg).count("–") == 3 * 16
 
 
 def test_what_each_learner_found_is_a_line_of_whole_sentences(comparison):
@@ -189,7 +183,7 @@ def texts_of(svg):
 
 
 def test_the_pipkin_map_of_error_holds_the_errors_of_the_result(comparison):
-    drawn = error_map_picture(comparison)
+    drawn = plots.error_map_picture(comparison)
     shown = texts_of(drawn.svg)
     before = comparison.error_map("before")
     assert len(before) == 16
@@ -242,8 +236,8 @@ def test_the_readme_s_script_draws_what_is_said_and_strain_integrates_the_rate(c
 
 def test_an_ellipse_has_no_third_harmonic_and_file_names_stay_in_the_folder():
     phase = np.linspace(0.0, 2.0 * np.pi, 121)
-    assert third_harmonic(np.cos(phase + 0.3)) < 1e-12
-    assert third_harmonic(np.cos(phase) + 0.1 * np.cos(3 * phase)) == pytest.approx(0.1)
+    assert plots.third_harmonic(np.cos(phase + 0.3)) < 1e-12
+    assert plots.third_harmonic(np.cos(phase) + 0.1 * np.cos(3 * phase)) == pytest.approx(0.1)
     assert "/" not in safe_name("../../etc/passwd")
     assert safe_name("flow_laos_3_1.5") == "flow_laos_3_1.5"
 
@@ -280,9 +274,9 @@ def test_a_picture_says_which_quantity_is_not_determined(comparison):
     assert comparison.undetermined == ["N2"]
     (flow, *_) = (f for f in comparison.flows if f.kind == "test" and f.oscillatory)
     said = "not determined by these data"
-    drawn = flow_picture(comparison, flow)
+    drawn = plots.flow_picture(comparison, flow)
     assert texts_of(drawn.svg).count(said) == 1
     assert comparison.placement(flow).text in drawn.caption
     assert f"{flow.title}, beyond range" in texts_of(drawn.svg)
     decided = replace(comparison, statements=())
-    assert said not in texts_of(flow_picture(decided, flow).svg)
+    assert said not in texts_of(plots.flow_picture(decided, flow).svg)

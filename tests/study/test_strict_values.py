@@ -11,39 +11,30 @@ from discover.study import RunFolder, parse_study, read_study
 from discover.study.atomic import LOCK_FILE
 
 
-def study(section, **values):
-    content = {"data": {"folder": "melt"}}
-    content[section] = {**content.get(section, {}), **values}
-    return parse_study(content)
+def study(**sections):
+    return parse_study({"data": {"folder": "melt"}} | sections)
 
 
-@pytest.mark.parametrize(
-    ("section", "values"),
-    [
-        ("model", {"modulus_Pa": True}),
-        ("model", {"modulus_Pa": "3"}),
-        ("model", {"parameters": {"alpha": True}}),
-        ("loop", {"max_effects": True}),
-        ("loop", {"max_effects": 2.0}),
-        ("loop", {"noise": True}),
-        ("loop", {"strain": [False, 1]}),
-        ("compare", {"quick": 1}),
-        ("compare", {"quick": "yes"}),
-        ("compare", {"seed": "7"}),
-    ],
-)
-def test_a_value_of_another_kind_is_refused_with_its_name(section, values):
-    (name,) = values
-    with pytest.raises(InputError, match=rf"{section}\.{name}.*should be.*; got"):
-        study(section, **values)
+OF_ANOTHER_KIND = {
+    "model": [("modulus_Pa", True), ("modulus_Pa", "3"), ("parameters", {"alpha": True})],
+    "loop": [("max_effects", True), ("max_effects", 2.0), ("noise", True), ("strain", [False, 1])],
+    "compare": [("quick", 1), ("quick", "yes"), ("seed", "7")],
+}
 
 
-def test_whole_numbers_truth_values_and_no_run_held_out_are_what_they_are():
-    model = study("model", law="giesekus", modulus_Pa=3, parameters={"alpha": 0}).model
-    assert (model.modulus_Pa, model.parameters["alpha"]) == (3.0, 0.0)
-    assert study("compare", quick=True).compare.quick is True
-    assert study("loop", strain=[0, 25]).loop.strain == (0.0, 25.0)
-    assert study("data", held_out=[]).data.held_out == ()
+@pytest.mark.parametrize("section", OF_ANOTHER_KIND)
+def test_a_value_of_another_kind_is_refused_with_its_name(section):
+    for name, value in OF_ANOTHER_KIND[section]:
+        with pytest.raises(InputError, match=rf"{section}\.{name}.*should be.*; got"):
+            study(**{section: {name: value}})
+    # the control: whole numbers and truth values are what they are
+    right = study(
+        model={"law": "giesekus", "modulus_Pa": 3, "parameters": {"alpha": 0}},
+        compare={"quick": True}, loop={"strain": [0, 25]}, data={"folder": "a", "held_out": []},
+    )  # fmt: skip
+    assert (right.model.modulus_Pa, right.model.parameters["alpha"]) == (3.0, 0.0)
+    assert (right.compare.quick, right.loop.strain) == (True, (0.0, 25.0))
+    assert right.data.held_out == ()
 
 
 @pytest.mark.parametrize(
