@@ -140,6 +140,7 @@ _EFFECTS = {
     "non_affine_motion": "non-affine motion",
     "ptt_linear": "linear PTT",
     "ptt_exponential": "exponential PTT",
+    "parallel_plates": "uncorrected parallel plates",
     "rate_rise_time": "motor response time",
     "relaxation_mode": "added mode",
     "softening_by_work": "work-softened relaxation",

@@ -135,12 +135,10 @@ class Constant:
         return interval(self.ci95)
 
     @property
-    def digits(self) -> int:
-        """Significant digits of the value in an equation: those of the interval, three at most."""
-        if not self.has_interval or self.ci95 is None or not self.value:
-            return 3
-        of_width = math.floor(math.log10(self.ci95[1] - self.ci95[0]))
-        return min(max(2 + math.floor(math.log10(abs(self.value))) - of_width, 1), 3)
+    def in_equation(self) -> float:
+        """Value with the digits that `number` has, three where that needs a power of ten."""
+        text = self._rounded(self.value).replace(_MINUS, "-") if self.determined else ""
+        return float(text or f"{self.value:.{3 if self.determined else 2}g}")
 
     @property
     def _unit(self) -> str:
@@ -258,8 +256,11 @@ _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
     "relaxation_time_s": ("λ", "relaxation time"),
-    "modulus_factor": ("G/G_0", "fitted moduli, as listed below, over those of the sweep"),
-    "relaxation_time_factor": ("λ/λ_0", "fitted times, as listed below, over those of the sweep"),
+    "modulus_factor": ("G/G_0", "moduli of the runs over the sweep's; included below"),
+    "relaxation_time_factor": (
+        "λ/λ_0",
+        "times of the runs over the sweep's; included below",
+    ),
     "eta_s": ("η_s", "Newtonian viscosity"),
     "L2": ("L²", "extensibility"),
     "stretch_time_ratio": ("θ", "stretch time ratio"),

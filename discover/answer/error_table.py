@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from discover.answer.sentences import SYMBOLS, at_most, worst_run
+from discover.answer.sentences import SYMBOLS, after_noise, at_most, only_quantity, worst_run
 from discover.words import percent_of
 
 
@@ -47,54 +47,49 @@ def errors(answer: Any) -> list[Errors]:
     for name, symbol in SYMBOLS.items():
         one = answer.expected(name)
         near, far = ("" if value is None else at_most(value) for value in one.spread)
-        if one.is_known:
-            beyond, at = "not measured", ""
-            if one.beyond is not None:
-                beyond, at = at_most(one.beyond), one.beyond_at or _BY_LAWS
-            measured.append(Row(symbol, _note(answer, one), _inside(answer, one), beyond, at))
-        if near:
+        beyond = "" if one.beyond is None or far else at_most(one.beyond)
+        if one.inside is not None or beyond:
+            at = one.beyond_at * bool(beyond)
+            measured.append(Row(symbol, one.note, _inside(answer, one), beyond, at))
+        if near or far:
             apart = True
-            by_law.append(Row(symbol, one.note, near, far))
+            seen = _NOT_MEASURED if one.inside is None else "tested, above"
+            by_law.append(Row(symbol, one.note * bool(near), near or seen, far))
         elif not one.is_known:
             row = Row(symbol, "", one.note or one.missing, None)
             if by_law and by_law[-1] == row._replace(symbol=by_law[-1].symbol):
                 row = row._replace(symbol=f"{by_law.pop().symbol}, {symbol}")
             by_law.append(row)
+    of = "".join(f"{symbol}, " for symbol in only_quantity(answer))
     if (worst := worst_run(answer)) is not None:
-        measured.insert(1, Row("worst run in range", *worst))  # below σ12
+        of_run = "" if worst[0].endswith(")") else of  # such a name has its quantity
+        measured.insert(1, Row(f"{of_run}worst run in range", *worst))  # below σ12
     if answer.best_classical is not None:
         near, error = answer.best_classical
-        measured.append(Row("best classical law", near, percent_of(error)))
-    if answer.falls_above:
-        told = f"falls above {answer.falls_above}"
-        by_law.append(Row("steady flow curve", "of this law", told, None))
+        measured.append(Row(f"{of}best classical law", near, percent_of(error)))
+    is_far = any(row.beyond for row in measured)
     heads = (_INSIDE, _TWICE) if apart else ("", "")
     title = f"{_UNTESTED}{': spread between equally good laws (not an error)' * apart}"
-    blocks = Errors(_title(answer), (_INSIDE, _BEYOND), measured), Errors(title, heads, by_law)
+    first = (_INSIDE, _BEYOND * is_far)
+    blocks = Errors(_title(answer), first, measured), Errors(title, heads, by_law)
     return [one for one in blocks if one.rows]
 
 
 _INSIDE, _BEYOND = "in\N{NO-BREAK SPACE}range", "beyond the range"
-_UNTESTED, _TWICE = "Never tested", "at twice the highest rate"
-_BY_LAWS = f"untested: equally good laws {_TWICE}"
+_UNTESTED, _TWICE, _NOT_MEASURED = "Never tested", "at twice the highest rate", "not measured"
 
 
 def _title(answer: Any) -> str:
     """Return what the errors are, and the noise that they do not hold."""
-    residual = answer.expected("sigma12").is_residual
-    of = "Residual of the fitted runs" if residual else "Error on unseen runs above noise"
-    return of + (f" ({'noise ' * residual}{percent_of(answer.noise)})" if answer.noise else "")
-
-
-def _note(answer: Any, one: Any) -> str:
-    """Return on what an error rests, and that it is more than the tolerance."""
-    missed = "above tolerance" * ((one.inside or 0.0) > answer.tolerance)
-    return ", ".join(filter(None, [one.note, missed]))
+    of = "Residual of the fitted runs"
+    if not answer.expected("sigma12").is_residual:
+        of = "Mean error on unseen runs"
+    return of + after_noise(answer)
 
 
 def _inside(answer: Any, one: Any) -> str:
-    """Return the error in the range; of what the verdict calls noise, that it is."""
+    """Return the error in the range; of what the verdict calls noise, that there is none."""
     if one.inside is None:
-        return "not measured"
+        return _NOT_MEASURED
     is_noise = not one.inside or (one.is_residual and answer.fits_to_the_noise)
-    return "within noise" if is_noise else at_most(one.inside)
+    return "none detected" if is_noise else at_most(one.inside)

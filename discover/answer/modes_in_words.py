@@ -83,22 +83,22 @@ def short(value: float) -> str:
 
 
 def linear_part(answer: Any) -> str:
-    """Return moduli, times, solvent and shift factors; of several modes their ends."""
-    found = []
-    for letter, unit, values in (
-        ("G", "Pa", [mode.modulus_Pa for mode in answer.modes]),
-        ("λ", "s", [mode.relaxation_time_s for mode in answer.modes]),
-    ):
-        low, high = (f"{as_constant(answer, v)} {unit}" for v in (min(values), max(values)))
-        only = f"{letter} = {as_constant(answer, values[0])} {unit}"
-        found.append(f"{letter} from {low} to {high}" if len(values) > 1 else only)
+    """Return modulus and time of one mode, of several the ends of the times; solvent and shifts."""
+    modes = answer.modes
+    if len(modes) == 1:
+        (mode,) = modes
+        found = [f"G = {as_constant(answer, mode.modulus_Pa)} Pa"]
+        found.append(f"λ = {as_constant(answer, mode.relaxation_time_s)} s")
+    else:
+        times = sorted(mode.relaxation_time_s for mode in modes)
+        found = [f"λ from {as_constant(answer, times[0])} to {as_constant(answer, times[-1])} s"]
     if answer.solvent_viscosity_Pa_s:
         found.append(f"η_s = {as_constant(answer, answer.solvent_viscosity_Pa_s)} Pa s")
     found += [f"a_T = {significant(one, 3)} at {degrees(at)}" for at, one in shifts(answer)]
     return ", ".join(found)
 
 
-FEW_MODES = 3
+FEW_MODES = 4
 """Relaxation modes up to which their table is open."""
 
 
@@ -114,9 +114,9 @@ def table(answer: Any) -> tuple[list[str], list[list[str]]]:
     for number, mode in enumerate(order, 1):
         at = answer.modes.index(mode)
         told = [one.of_mode(at) for one in each]
-        linear = (mode.modulus_Pa, mode.relaxation_time_s)
+        linear = zip((mode.modulus_Pa, mode.relaxation_time_s), OF_SWEEP, strict=True)
         name = f"{number}{' (added)' * is_added(answer, mode)}"
-        rows.append([name, *(as_constant(answer, one) for one in linear), *told])
+        rows.append([name, *(as_constant(answer, *one) for one in linear), *told])
     return ["mode", "G (Pa)", "λ (s)", *(one.symbol for one in each)], rows
 
 
@@ -139,8 +139,12 @@ def is_added(answer: Any, mode: Any) -> bool:
     return any(math.isclose(mode.modulus_Pa, one, rel_tol=1e-6) for one in added)
 
 
-def as_constant(answer: Any, value: float) -> str:
-    """Return a modulus, time or viscosity with the digits that it has among the constants."""
+def as_constant(answer: Any, value: float, factor: str = "") -> str:
+    """Return a modulus, time or viscosity with the digits that it has among the constants.
+
+    Two where a factor of these, such as ``modulus_factor``, is among them.
+    """
     own = (one for one in answer.constants if math.isclose(one.value, value, rel_tol=1e-6))
     found = next((one.number.removesuffix(f" {one.unit}") for one in own), "")
-    return found or significant(value, 3)
+    scaled = any(one.name == factor for one in answer.constants)
+    return found or significant(value, 2 if scaled else 3)

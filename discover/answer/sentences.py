@@ -8,9 +8,9 @@ from discover.words import LEVEL, counted, effect_title, listed, percent_of, sig
 
 _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
-# many), and how brief `description` is
+# many), and how brief the rest is
 _SHORTER = (
-    *((3, 0), (2, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3)),
+    *((3, 0), (3, 1), (2, 1), (1, 1), (1, 2), (1, 3), (0, 3)),
     *((-1, brief) for brief in range(2, 6)),
 )
 
@@ -37,7 +37,7 @@ def first_lines(answer: Any) -> tuple[str, str]:
     """
     told = "", ""
     for most, brief in _SHORTER:
-        parts = description(answer, brief), answer.failed, where(answer)
+        parts = description(answer, brief), answer.failed, where(answer), left_out(answer, brief)
         told = _law(answer, most), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
             break
@@ -122,38 +122,48 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", *modes.OF_SWEEP)
 
 
 def description(answer: Any, brief: int = 0) -> str:
-    """Return how well the law describes the runs, corrected for what, and if that is enough.
+    """Return how well the law describes the runs, and if that is enough.
 
-    `brief`: 1 without names of suspects, 2 without the worst run, 3 without interval, 4 without
-    whose errors several are and what these lack, 5 without suspects: the table has them.
+    `brief`: 1 without the worst run, 2 without interval, 4 without whose errors several are and
+    what these lack.
     """
     if not answer.title:
         return ""
-    noise = "" if answer.noise is None else percent_of(answer.noise)
-    found, each, own = answer.discrepancy, _unseen(answer), _corrected(answer, brief)
+    found, each = answer.discrepancy, _unseen(answer)
     most = max((one.inside for one in each.values()), default=1.0)
     (note,) = (one.note for one in each.values()) if len(each) == 1 else ("",)
     on = note if note.partition(" ")[2].startswith("unseen") else "unseen runs"
+    enough = tolerance(answer, brief)
     if answer.fits_to_the_noise and most <= answer.tolerance:
-        size, of = "≤ " * (len(each) > 1) + at_most(most), f" ({noise})" * bool(noise)
-        said = f"Predicts {on} to {size} above the noise{of}"
+        size = "≤ " * (len(each) > 1) + at_most(most)
+        said, enough = f"Mean error {size} on {on}{after_noise(answer)}", ""
     elif answer.fits_to_the_noise:
-        within = f"within the noise{f' of {noise}' * bool(noise)}"
-        said = f"Fits {'the flow curve ' * answer.range.steady}{within}"
+        of = "" if answer.noise is None else f" of {percent_of(answer.noise)}"
+        said = f"Fits {'the flow curve ' * answer.range.steady}within the noise{of}"
     elif found is None or not found.size:
         said = "" if answer.error is None else f"{_OF_FITTED} {percent_of(answer.error)}"
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-        ends = f" ({_LEVEL}{low}–{high} %)" * (low != high and brief < 3)
+        ends = f" ({_LEVEL}{low}–{high} %)" * (low != high and brief < 2)
         # of fitted runs it is no error that a prediction could have
-        size = percent_of(found.size) + ends
-        said = f"{_OF_FITTED} {size}"
+        said = f"{_OF_FITTED} {percent_of(found.size)}{ends}"
         if found.unseen:
-            said = _of_unseen(answer, each, f"{size} on {on}", brief)
-            own = own * (len(each) < 2 or "σ12" not in each)
-    enough = "" if said.startswith(("Predicts", "Meets")) else tolerance(answer, brief)
-    said = ", ".join(filter(None, [said, own * bool(said)]))
+            said = _of_unseen(answer, each, f"{percent_of(found.size)}{ends} on {on}", brief)
     return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
+
+
+def after_noise(answer: Any) -> str:
+    """Return that errors do not hold the noise."""
+    return f" after removing {percent_of(answer.noise)} noise" if answer.noise else ""
+
+
+def only_quantity(answer: Any) -> list[str]:
+    """Return the symbol of the one stress that was fitted; none of several."""
+    own = [SYMBOLS.get(_STRESSES.get(flow, flow), "") for flow in answer.range.flows]
+    return own if len(own) == 1 and own[0] else []
+
+
+_STRESSES = {"shear": "sigma12"}
 
 
 def _unseen(answer: Any) -> dict[str, Any]:
@@ -167,25 +177,20 @@ def _of_unseen(answer: Any, each: Mapping[str, Any], size: str, brief: int) -> s
 
     And the worst of these, where one misses the tolerance and the range does not say it.
     """
-    worst = None if brief > 1 or answer.discrepancy.met_up_to else worst_run(answer)
+    worst = None if brief or answer.discrepancy.met_up_to else worst_run(answer)
     of_worst = [] if worst is None else [f"worst run {worst[1]}"]
-    whose = "the default" if answer.tolerance == type(answer).tolerance else "your"
-    misses = f"Misses {whose} {percent_of(answer.tolerance)} tolerance: m" * _misses(answer) or "M"
     if len(each) < 2:
-        return ", ".join([f"{misses}ean error {size}", *of_worst])
-    told, met, in_shear = [], {True: [], False: []}, answer.range.flows == ("shear",)
+        of = f" of {next(iter(each))}" if each else ""
+        return ", ".join([f"Mean error{of} {size}", *of_worst])
+    told, in_shear = [], answer.range.flows == ("shear",)
     for symbol, one in each.items():
-        known = [*of_worst * in_shear, _corrected(answer, brief)] if symbol == "σ12" else []
-        known += [f"not corrected for {one.uncorrected}"] * bool(one.uncorrected and brief < 4)
-        behind, size = ", ".join(filter(None, known)), at_most(one.inside)
-        told.append(f"{symbol} {size}{f' ({behind})' * bool(behind)}")
-        split = f"{symbol} ({', '.join(filter(None, [size, behind]))})"
-        met[one.inside <= answer.tolerance].append(split)
+        known = of_worst * (in_shear and symbol == "σ12")
+        if one.uncorrected and brief < 4:
+            known = [*known, f"not corrected for {one.uncorrected}"]
+        behind = f" ({', '.join(known)})" * bool(known)
+        told.append(f"{symbol} {at_most(one.inside)}{behind}")
     data = " on unseen data" * (brief < 4)
-    if met[True] and met[False]:
-        level, lacks = percent_of(answer.tolerance), listed(met[False])
-        return f"Meets {level}{data} for {listed(met[True])}, not for {lacks}"
-    return f"{misses}ean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
+    return f"Mean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
 def _misses(answer: Any) -> bool:
@@ -194,34 +199,39 @@ def _misses(answer: Any) -> bool:
     return bool(answer.adequate is False and found and found.unseen and not found.met_up_to)
 
 
-def _corrected(answer: Any, brief: int) -> str:
-    """Return what of the instrument predictions of the records hold; empty where nothing."""
-    names = [
-        f"{effect_title(one.effect)}{f' (≤ {percent_of(one.correction)})' * bool(one.correction)}"
-        for one in answer.suspects[: None if brief < 5 else 0]
-    ]
-    few = len(names) <= (1 if brief else _MOST_SUSPECTS)
-    told = listed(names) if few else f"{len(names)} measurement errors"
-    return f"with {told} fitted too" if names else ""
+def left_out(answer: Any, brief: int = 0) -> str:
+    """Return what of the instrument is no part of the fluid, and so of no simulation.
+
+    `brief`: from 3 on of several no names, from 5 on nothing: the table has them.
+    """
+    names = [effect_title(one.effect) for one in answer.suspects]
+    if not names or brief > 4:
+        return ""
+    told = listed(names) if brief < 3 or len(names) == 1 else f"{len(names)} measurement errors"
+    return f"Leave out of simulations: {told} (instrument)."
 
 
-_MOST_SUSPECTS, _OF_FITTED = 2, "Residual of the fitted runs"
+_OF_FITTED = "Residual of the fitted runs"
 
 
 def tolerance(answer: Any, brief: int = 0) -> str:
-    """Return whether the tolerance is met, unless `brief` in how many runs.
+    """Return whether the tolerance is met, or unless `brief` in how many runs.
 
-    Empty where that was said of unseen runs, or `where` says up to which rate.
+    Alone of several quantities that do and do not; empty where `where` says up to which rate.
     """
-    over = len(_over_tolerance(answer))
-    in_part = over and answer.discrepancy.met_up_to
-    if answer.adequate is None or _misses(answer) or in_part:
+    if answer.adequate is None:
+        return ""
+    over, level = len(_over_tolerance(answer)), f"tolerance {percent_of(answer.tolerance)}"
+    each = _unseen(answer)
+    if 0 < sum(one.inside <= answer.tolerance for one in each.values()) < len(each):
+        return level
+    if over and answer.discrepancy.met_up_to:
         return ""
     state = "met" if answer.adequate else "missed"
     if over and (not brief or answer.adequate):
         every = len(answer.discrepancy.by_run)
         state = f"met in {every - over or 'none'} of {counted(every, 'run')}"
-    return f"tolerance {percent_of(answer.tolerance)} {state}"
+    return f"{level} {state}"
 
 
 def flows_of(kinds: Sequence[str]) -> str:
@@ -257,8 +267,7 @@ def usable(answer: Any) -> tuple[list[str], str]:
     if not implied:
         return tested, ""
     apart = at_most(max(implied.values())).removeprefix("< ")
-    what = f"Untested prediction{'s' * (len(implied) > 1)}: {listed([*implied])}"
-    return tested, f"{what}; equally good laws agree within {apart}."
+    return tested, f"Untested: {listed([*implied])}; equally good laws agree within {apart}."
 
 
 def where(answer: Any) -> str:
@@ -272,7 +281,9 @@ def where(answer: Any) -> str:
     only = " only" * (len(quantities) == 1 and not implied)
     place = _in_part(answer, place) or f", {place}"
     comma = "," * bool(only and not place.startswith(","))
-    return " ".join(filter(None, [f"{use}{only}{comma}{place}.", implied]))
+    falls = f"Not for steady flow above {answer.falls_above}, where its flow curve falls."
+    said = f"{use}{only}{comma}{place}.", falls * bool(answer.falls_above), implied
+    return " ".join(filter(None, said))
 
 
 def _in_part(answer: Any, place: str) -> str:
@@ -365,7 +376,7 @@ def suspects(answer: Any) -> str:
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 
-SUSPECTED = "Suspected in the measurement, not part of the law; errors allow for it"
+SUSPECTED = "Effects of the instrument, fitted too but not part of the law"
 """Heading of effects of the instrument and of the flow in the gap."""
 
 NOT_SEPARABLE = "sizes not separable"

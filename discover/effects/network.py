@@ -215,13 +215,13 @@ RELAXATION_MODE = RelaxationMode(
     name="relaxation_mode", complexity=2,
     parameters=(
         EffectParameter(
-            "G", "G_+", "Pa", meaning="modulus of the added mode", low=0.0,
+            "G", "G_+", "Pa", meaning="modulus of the added mode, listed below", low=0.0,
             high=1e10, scale="stress", first_trial=0.05,
             range_source="Ferry 1980, ch. 2: glasses have 1e9 Pa, and nothing that flows has more",
         ),
         EffectParameter(
-            "lambda", r"\lambda_+", "s", meaning="time of the added mode", low=1e-6, high=30.0,
-            scale="run_time", first_trial=0.1, range_scale="run_time",
+            "lambda", r"\lambda_+", "s", meaning="time of the added mode, listed below", low=1e-6,
+            high=30.0, scale="run_time", first_trial=0.1, range_scale="run_time",
             range_source="a mode that is a millionth of a run long cannot be told from a solvent, "
             "nor one that is 30 runs long from a spring (Davies & Anderssen 1997, J. "
             "Non-Newtonian Fluid Mech. 73, 163: records determine times little beyond their own "

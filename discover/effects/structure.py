@@ -179,7 +179,8 @@ THIXOTROPIC_RELAXATION_TWO_TIMES = TwoStructures(
     name="thixotropic_relaxation_two_times",
     parameters=(INVERSE_RATE, _FAST, SLOWNESS, SLOW_SHARE),
     equation=r"\lambda_k \to [(1 - w)\,q_1 + w\,q_2]\,\lambda_k,\quad t_i\frac{dq_i}{dt} = 1 - q_i"
-    r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^{2/3} q_i,\quad t_2 = R\,t_1",
+    r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^{2/3} q_i,\quad t_2 = R\,t_1,"
+    r"\quad 2/3\ \mathrm{fixed}",
     source="Wei, Solomon & Larson 2018, J. Rheol. 62, 321, for several times with one steady state",
     check="Rest for different lengths before a start: recovery in two steps.",
     visible="as thixotropic_relaxation.",

@@ -128,9 +128,9 @@ def _by_law(result: Any, kind: str) -> ExpectedError:
     unused = "measured but not used" if there else None  # no sample of it is sound
     settled = kind != "N1" or normal_stress_settled(result)
     if apart is not None and (apart >= limit or not settled):
-        above = f"{'of N1, ' * (kind == 'N2')}limit {percent_of(limit)}" * (apart >= limit)
+        above = f", above {percent_of(limit)}{' of N1' * (kind == 'N2')}" * (apart >= limit)
         missing = "not determined"
-        note = ", ".join(filter(None, [missing, above, unused]))
+        note = ", ".join(filter(None, [missing + above, unused]))
         return ExpectedError(missing=missing, note=note, spread=ends)
     found = result.spread_of_laws.get("N2") if kind == "N2" and ends[0] is not None else None
     if found is not None and found.over_n1 is not None:

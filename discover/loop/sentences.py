@@ -17,6 +17,7 @@ MOST_NAMES = 3
 EXPLAINED = ("effects_added", "no_effect_needed")
 
 _EVEN = 0.5
+_MUCH_FASTER = 10.0  # Rate over the fastest at which there was no signal, to measure at next
 
 
 def several(names: Sequence[str]) -> str:
@@ -62,11 +63,12 @@ def doubted(result: Any) -> float | None:
 
 def what_to_measure_next(result: Any) -> str:
     """Return what would say most: more signal, a check of an effect, another test."""
-    faster = f"a shear rate above {_fastest(result.records)}"
     if result.verdict == "no_signal":
+        # stress of a fluid that thins grows less than its rate
+        faster = as_measured(result.records, _MUCH_FASTER * max(r.fastest for r in result.records))
         return (
             "Check that the sensor is connected and the sample loaded; use a larger plate or cone, "
-            f"a more sensitive transducer, or {faster}."
+            f"a more sensitive transducer, or a shear rate of {faster} or more."
         )
     if result.material is not None:
         return result.stages[0].check
@@ -98,7 +100,7 @@ def what_to_measure_next(result: Any) -> str:
     if (doubtful is None or not doubtful.aliases) and (told := _of_predicted_n1(result)):
         return told
     if doubtful is None:
-        return f"Measure {faster}: it tests the model hardest."
+        return f"Measure at twice {_fastest(result.records)}: it tests the model hardest."
     check, title = _as_clause(doubtful.check), words.effect_title(doubtful.effect)
     if not doubtful.aliases:
         return f"To confirm {title}, {check}."
@@ -126,8 +128,8 @@ def _of_sweep(result: Any) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            are = f"{OF_SWEEP[name]} are {Constant(name, one.value, one.ci95).measured('')} times"
-            return f"Measure sweep and runs on one filling: the runs' {are} the sweep's."
+            are = f"{OF_SWEEP[name]} are {Constant(name, one.value, one.ci95).number} times"
+            return f"Measure sweep and runs on one loading: the runs' {are} the sweep's."
     return ""
 
 
@@ -179,8 +181,8 @@ def _of_predicted_n1(result: Any) -> str:
     if any(record.has_normal_stress for record in result.records):
         return "Fit N1 too, which runs recorded: the law predicts it, and observe leaves it out."
     found = result.spread_of_laws["N1"].steady
-    what = "" if found is None else f", where it predicts {words.significant(found, 2)} Pa"
-    return f"Test the law by N1 in steady shear at {_fastest(_sheared(result))}{what}."
+    what = "" if found is None else f": the law predicts {words.significant(found, 2)} Pa"
+    return f"Measure N1 in steady shear at {_fastest(_sheared(result))}{what}."
 
 
 def _sheared(result: Any) -> list[RunRecord]:

@@ -92,10 +92,12 @@ def check_of(material: SimpleMaterial) -> str:
     """Return what to measure next of a material."""
     if material.kind != "yield_stress":
         return _CHECKS[material.kind]
-    first, *_ = material.constants
+    first, consistency, index = material.constants
     low, high = first.ci95 or (first.value, first.value)
-    below, above = (significant(end, 2) for end in (_BELOW * low, high / _BELOW))
-    return f"Creep at {below} Pa and {above} Pa: it should flow only at {above} Pa."
+    below, above = _BELOW * low, high / _BELOW
+    rate = ((above - first.value) / consistency.value) ** (1.0 / index.value)
+    slow, fast, flows = (significant(one, 2) for one in (below, above, rate))
+    return f"Creep at {slow} Pa and {fast} Pa until steady: by this law 0 and {flows} 1/s."
 
 
 _BELOW = 0.9  # Stress of a creep over the yield stress, far enough from it to be told in an hour

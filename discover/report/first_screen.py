@@ -36,7 +36,6 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
                 symbols[i] = one.symbol.replace("σ", "τ")
                 headline = headline.replace(one.symbol, symbols[i])
     ends = answer.range.rate_1_s
-    doubts = answer.suspects or sentences.worst_run(answer) or answer.failed
     shifts = [
         (modes.degrees(at), words.significant(one, 3),
          modes.span((ends[0] / one, ends[1] / one)) if ends else "–")
@@ -50,7 +49,6 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "headline": headline,
         "quality": quality,
         "fitted": _fitted(answer),
-        "open": not (answer.title and answer.adequate is not False and not doubts),
         "law": _typeset(answer),
         "constants": [
             (symbol, unbroken(_said(one)), in_cell(one.number), in_cell(one.interval))
@@ -78,7 +76,7 @@ def _fitted(answer: Answer) -> str:
 def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is possible."""
     end = "at its physical limit" * one.at_limit
-    absent = "may be infinite, without effect" * one.may_be_absent
+    absent = "may be infinite: equally good laws do without" * one.may_be_absent
     poor = sentences.POORLY * (one.is_poor and one.determined)
     return "; ".join(filter(None, [one.said, end, poor, absent]))
 
@@ -119,8 +117,8 @@ def _rounded(equation: Equation, answer: Answer) -> Equation:
     """Return an equation with the digits that the intervals leave, three at most."""
 
     def short(value: float) -> float:
-        digits = next((one.digits for one in answer.constants if np.isclose(one.value, value)), 3)
-        return float(f"{value:.{digits}g}")
+        own = (one.in_equation for one in answer.constants if np.isclose(one.value, value))
+        return next(own, float(f"{value:.3g}"))
 
     def all_short(values: Mapping[str, float]) -> dict[str, float]:
         return {name: short(value) for name, value in values.items()}
@@ -178,9 +176,13 @@ def _factors_first(equations: Sequence[str]) -> list[str]:
             factors.setdefault(what, []).append(factor.strip())
         rest.append(others if arrow else one)
     said = [
-        rf"{what}\ \mathrm{{is\ multiplied\ by}}\ " + r"\,".join(f) for what, f in factors.items()
+        rf"{what}\ \mathrm{{is\ multiplied\ by}}\ " + r"\,".join(f) + _PART
+        for what, f in factors.items()
     ]
     return [r",\quad".join(said), *rest] if said else rest
+
+
+_PART = r"\ \mathrm{(part\ of\ the\ law)}"  # so that no simulation leaves it out
 
 
 def _at_rest(states: Sequence[str], effect: StateEffect) -> str:

@@ -162,11 +162,10 @@ _EXPLAINED = {
     "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
     "unseen data": "what no fit used: runs left out, or another quantity of a run",
     "unseen runs": "runs that a fit did not use: held out, or left out in turn",
-    "tolerance": "largest mean error above noise that is good enough: 5 % unless you set another",
-    "Meets": "mean error above noise is within the tolerance: 5 % unless you set another",
-    "above the noise": "mean over runs of the root of squared error less squared noise",
+    "tolerance": "largest mean error that is good enough: 5 % unless you set another",
+    "removing": "mean over runs of the root of squared error less squared noise",
 }
-_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|Meets|above the noise)"
+_EXPLAINS = r"\b(?:(?:Wi|De)(?=\s=)|unseen (?:runs|data)|tolerance|removing)"
 
 
 def explained(text: str) -> Markup:
