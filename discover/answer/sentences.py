@@ -320,7 +320,9 @@ def _place(answer: Any) -> str:
     tests = f"{listed(one.tests)} at " if one.tests else ""
     if not one.by_temperature:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
-        return f"{tests}{rates}{reduced}" if (rates := _rates(one)) else ""
+        if rates := _rates(one):
+            return f"{tests}{rates}{reduced}"
+        return f"{tests}strains up to {modes.short(one.strain[1])}" * bool(tests and one.strain)
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
     return tests + (listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}")
 

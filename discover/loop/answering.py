@@ -209,7 +209,11 @@ def _alternative(result: Any) -> str:
         return f"An oil of {thick} Pa s behind a motor with t_m = {rises} s{tool} records the same."
     told = result.explanations
     own = told.holding([stage.effect for stage in result.stages])
-    if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
+    if result.verdict not in EXPLAINED or own is None:
+        return ""
+    if twins := [one for one in own.twins if not set(own.effects) < set(one)]:
+        return f"{effects_title(twins[0])} predicts these runs alike."
+    if own.probability < _SETTLED:
         others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
         after = f"; next: {others[0] or 'the declared model'}" if others else ""
         return f"Probability of this law {percent_of(own.probability)}{after}."

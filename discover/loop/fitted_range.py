@@ -98,12 +98,14 @@ def _turns(record: RunRecord) -> bool:
 
 
 def _test(record: RunRecord) -> str:
-    """Return what a transient is, in words; empty of what turns, is at rest, and of states."""
+    """Return what a transient is, in words; empty of what turns, and of states."""
     before = record.rate_before
-    if not record.is_transient or _turns(record) or (record.fastest == 0.0 and not before):
+    if not record.is_transient or _turns(record):
         return ""
     if record.control == "stress":
         return "creep"
+    if record.fastest == 0.0 and not before:
+        return "stress relaxation"
     rates = record.rate * np.sign(record.rate[-1])
     one = np.percentile(rates, 5.0) >= _SAME * record.fastest
     if one and not before:

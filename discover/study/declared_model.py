@@ -287,8 +287,8 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
 def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
     """Return a modulus in Pa and a relaxation time in s of the right order from the runs.
 
-    A tenth of the median duration, or an inverse middle rate; the largest stress over rate times
-    it.
+    A tenth of the median duration, or an inverse middle rate; the largest stress over rate, or of a
+    flow curve a middle viscosity, over that.
     """
 
     def slowest(run: Run) -> float:
@@ -299,9 +299,11 @@ def linear_start(runs: Sequence[Run]) -> tuple[float, float]:
         return 0.1 * float(run.time[-1])
 
     time = float(np.median([slowest(run) for run in runs] or [1.0]))
-    stressed = [(run, np.max(np.abs(run.stress))) for run in runs if np.any(run.stress)]
-    rates = [(stress, np.max(np.abs(run.rate))) for run, stress in stressed]
-    viscosities = [stress / rate for stress, rate in rates if rate > SLOWEST_RATE]
+    # of a flow curve a middle viscosity: that of the fastest rate is far from the slow ones
+    middle = {True: np.median, False: np.max}
+    stressed = [(run, middle[run.protocol.control == "steady"]) for run in runs if run.stress.any()]
+    pairs = [(typical(np.abs(run.stress)), typical(np.abs(run.rate))) for run, typical in stressed]
+    viscosities = [stress / rate for stress, rate in pairs if rate > SLOWEST_RATE]
     moduli = [
         float(np.max(np.abs(run.stress)) / np.max(np.abs(run.strain)))
         for run in runs

@@ -8,6 +8,7 @@ import pytest
 from independent import Giesekus, UpperConvectedMaxwell, of_rate
 from independent.noise import white
 from noisy_runs import run_at, start_ups
+from scipy.optimize import brentq
 
 import discover as dc
 from discover.dataset.records.repeats import count_flows
@@ -220,3 +221,36 @@ def test_an_inertia_behind_the_motor_is_a_solvent_beside_the_mode():
     found = oil_twin((viscosity - solvent) / rise, rise, solvent, list(of_oil((1.0,))))
     exact = {"viscosity": viscosity, "rise_time": rise, "inertia": inertia}
     assert found == {name: pytest.approx(value, rel=1e-12) for name, value in exact.items()}
+
+
+def in_flow_curve(law, declared):
+    """Return the effects that a flow curve of a fluid of the field needs, with 1 % noise."""
+    rates = np.geomspace(0.05, 50.0, 25)
+    drawn = 1.0 + 0.01 * np.random.default_rng(5).standard_normal(25)
+    curve = np.array([law(rate) for rate in rates]) * drawn
+    run = dc.Run("flow_curve.csv", np.arange(1.0, 26.0), steady_rates(rates), rates, curve)
+    effects = ["giesekus_mobility", "wall_slip", "ptt_linear"]
+    return run_loop(dc.Dataset("made", (run,)), declared, effects=effects, max_effects=2)
+
+
+@pytest.mark.parametrize("alpha", [0.3, 0.5])
+def test_a_giesekus_flow_curve_slips_at_no_wall_where_modulus_and_time_are_fitted(alpha):
+    declared = replace(TO_FIT, modulus=np.array([3.6]), relaxation_time=np.array([0.6]))
+    result = in_flow_curve(lambda rate: Giesekus(alpha, 100.0).steady_shear(rate)[0], declared)
+    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
+    low, high = result.stages[0].parameters["alpha"].ci95
+    # three halves of a 95 % interval on either side: one draw of noise
+    assert abs(alpha - 0.5 * (low + high)) < 1.5 * (high - low)
+
+
+def test_slip_of_a_flow_curve_is_told_where_modulus_and_time_are_known():
+    def slips(rate):
+        # γ̇ = γ̇ of the fluid + β σ, which rises with the fluid's own rate
+        own = brentq(lambda r: r + 0.03 * fluid(r) - rate, 1e-9, rate)
+        return fluid(own)
+
+    def fluid(rate):
+        return Giesekus(0.3, 100.0).steady_shear(rate)[0]
+
+    result = in_flow_curve(slips, DECLARED)
+    assert "wall_slip" in [stage.effect for stage in result.stages]

@@ -193,7 +193,10 @@ def _starts(
     """Return the most promising hypotheses with a function, scored to first order, by its width."""
     scored, widths = [], np.array([own.width for own in functions])
     for fit in bases:
-        values, sizes = _first_order(fitter, fit, functions[0].signatures(fit), widths)
+        signatures = functions[0].signatures(fit)
+        if not np.all(np.isfinite(signatures)):
+            continue  # a step away the law runs away
+        values, sizes = _first_order(fitter, fit, signatures, widths)
         for own, value, size in zip(functions, values, sizes, strict=True):
             # slip, which is not linear, starts from none: its first order may be far
             linear = np.append(fit.linear, size)[: len(own.errors)]
@@ -220,13 +223,14 @@ def _first_order(
     By one step from where the hypothesis ended without the function.
     """
     assert fit.jacobian is not None
-    assert fit.covariance is not None
+    assert fit.root is not None
     record, k = fitter.record(fit), signatures.shape[1]
-    columns = np.column_stack([fit.jacobian, signatures])
+    # along what is independent of each other, however unlike the sizes of the constants are
+    columns = np.column_stack([fit.jacobian @ fit.root, signatures])
     both = np.column_stack([columns, fitter.rows.recorded - record])
     white = fitter.noise.whitened(both, record, fit.noise)
     curvature = white[:, :-1].T @ white[:, :-1]
-    curvature[:-k, :-k] = np.linalg.inv(fit.covariance)
+    curvature[:-k, :-k] = np.eye(len(fit.root))
     curvature = np.tile(curvature, (len(widths), 1, 1))
     at = np.arange(curvature.shape[1] - k, curvature.shape[1])
     curvature[:, at, at] += 1.0 / widths[:, None] ** 2

@@ -7,7 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.effects import AbstractEffect, EffectParameter, make_effect
+from discover.effects import (
+    AbstractEffect,
+    ConstitutiveEffect,
+    EffectParameter,
+    make_effect,
+)
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel, data_scales
 from discover.forward.declared import LARGEST
@@ -256,17 +261,24 @@ class Problem:
         """Whether one factor on all relaxation times is a constant to be fitted."""
         return 1 in self.declared.free_positions
 
-    def other_times(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
+    def other_times(
+        self, names: Sequence[str], theta: Float[np.ndarray, " p"]
+    ) -> list[Float[np.ndarray, " p"]]:
         """Return vectors of the same viscosity with other relaxation times, where these are fitted.
 
-        Of a time too short or too long to be seen the records say nothing: no step leads back.
+        Of a time too short or too long to be seen the records say nothing: no step leads back. A
+        term first changes the viscosity as its amplitude times the square of the time; of one such
+        product slow flows are the same, and no step leads along it either.
         """
         if not self.fits_times:
             return []
+        terms = (e for e in map(self.effects.get, names) if isinstance(e, ConstitutiveEffect))
+        at = [self.model.positions(e.name)[0] for e in terms if e.adds_term]
         found = []
         for stretch in _STARTS:
             other = theta.copy()
             other[1] = np.log(stretch)
+            other[at] *= np.exp(2.0 * (theta[1] - other[1]))
             if 0 in self.declared.free_positions:
                 other[0] += theta[1] - other[1]
             found.append(other)

@@ -94,7 +94,7 @@ class Search:
 
     def at_several_times(self, start: Fit) -> list[Fit]:
         """Return a hypothesis to be fitted, and the same from other relaxation times."""
-        others = self.problem.other_times(start.theta)
+        others = self.problem.other_times(start.names, start.theta)
         return [start, *(self.fitter.start(start.names, one, start.linear) for one in others)]
 
     def run(self) -> "Search":
