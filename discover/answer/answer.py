@@ -100,6 +100,16 @@ class Answer:
         return 0.0 if self.fits_to_the_noise else self.error
 
     @property
+    def error_by_run(self) -> Mapping[str, float]:
+        """Discrepancy of each run by its name; empty where unknown."""
+        return {} if self.discrepancy is None else self.discrepancy.by_run
+
+    @property
+    def met_up_to(self) -> str:
+        """Rate up to which each run meets the tolerance; empty where all or none do."""
+        return "" if self.discrepancy is None else self.discrepancy.met_up_to
+
+    @property
     def adequate(self) -> bool | None:
         """Whether the discrepancy is within the tolerance; None where it is unknown."""
         if not self.title or self.size is None:

@@ -1,10 +1,13 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from discover.answer import modes_in_words as modes
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
+
+if TYPE_CHECKING:  # which is made of what stands here
+    from discover.answer.answer import Answer
 
 _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
@@ -25,12 +28,12 @@ A_TRANSIENT = (
 """What to measure where nothing but states was."""
 
 
-def headline(answer: Any) -> str:
+def headline(answer: "Answer") -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
     return " ".join(filter(None, first_lines(answer)))
 
 
-def first_lines(answer: Any) -> tuple[str, str]:
+def first_lines(answer: "Answer") -> tuple[str, str]:
     """Return the law by name with constants, then how well it describes and where to use it.
 
     As short as need be: what gives way is in the table. Without a law, what stands in its place.
@@ -52,7 +55,7 @@ def words(text: str) -> int:
     return sum(any(map(str.isalnum, one)) for one in text.split())
 
 
-def _law(answer: Any, most: int) -> str:
+def _law(answer: "Answer", most: int) -> str:
     """Return the law by name with at most so many of its constants."""
     if not answer.title:
         return answer.instead
@@ -101,7 +104,7 @@ def constants(several: Sequence[Any]) -> list[str]:
     return [one.with_interval(_LEVEL if one is first else "") for one in several]
 
 
-def is_a_set(answer: Any) -> bool:
+def is_a_set(answer: "Answer") -> bool:
     """Return whether constants go together: one is far from the middle of its interval.
 
     Intervals are over all laws that fit as well, so that ends of several make no law that does.
@@ -121,7 +124,7 @@ def differ(ci95: Sequence[float] | None, tolerance: float) -> bool:
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", *modes.OF_SWEEP)
 
 
-def description(answer: Any, brief: int = 0) -> str:
+def description(answer: "Answer", brief: int = 0) -> str:
     """Return how well the law describes the runs, and if that is enough.
 
     `brief`: 1 without the worst run, 2 without interval, 4 without whose errors several are and
@@ -152,12 +155,12 @@ def description(answer: Any, brief: int = 0) -> str:
     return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
 
 
-def after_noise(answer: Any) -> str:
+def after_noise(answer: "Answer") -> str:
     """Return that errors do not hold the noise."""
     return f" after removing {percent_of(answer.noise)} noise" if answer.noise else ""
 
 
-def only_quantity(answer: Any) -> list[str]:
+def only_quantity(answer: "Answer") -> list[str]:
     """Return the symbol of the one stress that was fitted; none of several."""
     own = [SYMBOLS.get(_STRESSES.get(flow, flow), "") for flow in answer.range.flows]
     return own if len(own) == 1 and own[0] else []
@@ -166,18 +169,18 @@ def only_quantity(answer: Any) -> list[str]:
 _STRESSES = {"shear": "sigma12"}
 
 
-def _unseen(answer: Any) -> dict[str, Any]:
+def _unseen(answer: "Answer") -> dict[str, Any]:
     """Return errors of what was measured and not fitted, by symbol."""
     each = {symbol: answer.expected(name) for name, symbol in SYMBOLS.items()}
     return {s: one for s, one in each.items() if one.inside is not None and not one.is_residual}
 
 
-def _of_unseen(answer: Any, each: Mapping[str, Any], size: str, brief: int) -> str:
+def _of_unseen(answer: "Answer", each: Mapping[str, Any], size: str, brief: int) -> str:
     """Return mean errors of unseen runs: of each quantity where several were measured, or of all.
 
     And the worst of these, where one misses the tolerance and the range does not say it.
     """
-    worst = None if brief or answer.discrepancy.met_up_to else worst_run(answer)
+    worst = None if brief or answer.met_up_to else worst_run(answer)
     of_worst = [] if worst is None else [f"worst run {worst[1]}"]
     if len(each) < 2:
         of = f" of {next(iter(each))}" if each else ""
@@ -193,13 +196,13 @@ def _of_unseen(answer: Any, each: Mapping[str, Any], size: str, brief: int) -> s
     return f"Mean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
-def _misses(answer: Any) -> bool:
+def _misses(answer: "Answer") -> bool:
     """Return whether unseen runs miss the tolerance in the mean, and at each rate."""
     found = answer.discrepancy
     return bool(answer.adequate is False and found and found.unseen and not found.met_up_to)
 
 
-def left_out(answer: Any, brief: int = 0) -> str:
+def left_out(answer: "Answer", brief: int = 0) -> str:
     """Return what of the instrument is no part of the fluid, and so of no simulation.
 
     `brief`: from 3 on of several no names, from 5 on nothing: the table has them.
@@ -214,7 +217,7 @@ def left_out(answer: Any, brief: int = 0) -> str:
 _OF_FITTED = "Residual of the fitted runs"
 
 
-def tolerance(answer: Any, brief: int = 0) -> str:
+def tolerance(answer: "Answer", brief: int = 0) -> str:
     """Return whether the tolerance is met, or unless `brief` in how many runs.
 
     Alone of several quantities that do and do not; empty where `where` says up to which rate.
@@ -225,11 +228,11 @@ def tolerance(answer: Any, brief: int = 0) -> str:
     each = _unseen(answer)
     if 0 < sum(one.inside <= answer.tolerance for one in each.values()) < len(each):
         return level
-    if over and answer.discrepancy.met_up_to:
+    if over and answer.met_up_to:
         return ""
     state = "met" if answer.adequate else "missed"
     if over and (not brief or answer.adequate):
-        every = len(answer.discrepancy.by_run)
+        every = len(answer.error_by_run)
         state = f"met in {every - over or 'none'} of {counted(every, 'run')}"
     return f"{level} {state}"
 
@@ -246,7 +249,7 @@ _FLOWS = {
 }
 
 
-def usable(answer: Any) -> tuple[list[str], str]:
+def usable(answer: "Answer") -> tuple[list[str], str]:
     """Return for what the law may be used, and what else it predicts.
 
     That is what nothing tested and equally good laws agree in, up to the first that they do not.
@@ -270,12 +273,12 @@ def usable(answer: Any) -> tuple[list[str], str]:
     return tested, f"Untested: {listed([*implied])}; equally good laws agree within {apart}."
 
 
-def where(answer: Any) -> str:
+def where(answer: "Answer") -> str:
     """Return for what the law may be used, and in which flows; of no use, where it was fitted."""
     place, (quantities, implied) = _place(answer), usable(answer)
     if not place:
         return ""
-    if not quantities or (answer.adequate is False and answer.size > _USELESS):
+    if not quantities or (answer.adequate is False and (answer.size or 0.0) > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
     use = f"{'If that suffices, use' if _misses(answer) else 'Use'} for {listed(quantities)}"
     only = " only" * (len(quantities) == 1 and not implied)
@@ -286,10 +289,10 @@ def where(answer: Any) -> str:
     return " ".join(filter(None, said))
 
 
-def _in_part(answer: Any, place: str) -> str:
+def _in_part(answer: "Answer", place: str) -> str:
     """Return where each run meets the tolerance, and by how much others miss it; empty if none."""
     worst, one = worst_run(answer), answer.range
-    if worst is None or not (met := answer.discrepancy.met_up_to):
+    if worst is None or not (met := answer.met_up_to):
         return ""
     within, number = f"within {percent_of(answer.tolerance)}", met.removesuffix(" 1/s")
     (at, own), *others = [*one.by_temperature.items()] or [(None, one)]
@@ -302,7 +305,7 @@ def _in_part(answer: Any, place: str) -> str:
     return f" in {flows}: {within} at {slow}; up to {worst[1]} off at {number}–{high} 1/s"
 
 
-def _place(answer: Any) -> str:
+def _place(answer: "Answer") -> str:
     """Return rates and frequencies of the fitted runs, by the temperature of the measurement.
 
     In numbers without units where the modes have none.
@@ -319,10 +322,14 @@ def _place(answer: Any) -> str:
         return f"{flows}{', ' * bool(flows)}Wi = λγ̇ ≤ {modes.short(one.weissenberg[1])}{rate}{slow}"
     tests = f"{listed(one.tests)} at " if one.tests else ""
     if not one.by_temperature:
-        reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
+        reduced = (
+            f" reduced to {modes.reduced_to(answer.temperature_C)}" if answer.shift_factors else ""
+        )
         if rates := _rates(one):
             return f"{tests}{rates}{reduced}"
-        return f"{tests}strains up to {modes.short(one.strain[1])}" * bool(tests and one.strain)
+        if not tests or one.strain is None:
+            return ""
+        return f"{tests}strains up to {modes.short(one.strain[1])}"
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
     return tests + (listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}")
 
@@ -342,13 +349,12 @@ def _rates(one: Any) -> str:
     return ", ".join(found)
 
 
-def _over_tolerance(answer: Any) -> dict[str, float]:
+def _over_tolerance(answer: "Answer") -> dict[str, float]:
     """Return runs that are missed by more than the tolerance, with their discrepancy."""
-    by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
-    return {name: size for name, size in by_run.items() if size > answer.tolerance}
+    return {name: size for name, size in answer.error_by_run.items() if size > answer.tolerance}
 
 
-def worst_run(answer: Any) -> tuple[str, str] | None:
+def worst_run(answer: "Answer") -> tuple[str, str] | None:
     """Return name and error of the run that is missed most; None where all are within tolerance."""
     over = _over_tolerance(answer)
     if not over:
@@ -368,7 +374,7 @@ MUCH, _LITTLE = 2.0, 1e-3
 """Relative errors from which on, and up to which, their size says nothing."""
 
 
-def suspects(answer: Any) -> str:
+def suspects(answer: "Answer") -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
     if not answer.suspects:
         return ""
@@ -385,6 +391,6 @@ NOT_SEPARABLE = "sizes not separable"
 """What is said of several of them that these runs do not give a size each."""
 
 
-def separable(answer: Any) -> bool:
+def separable(answer: "Answer") -> bool:
     """Return whether the runs give each suspect a size of its own."""
     return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)

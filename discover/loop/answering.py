@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -31,6 +31,9 @@ from discover.loop.sentences import (
 )
 from discover.words import effect_title, effects_title, listed, percent_of, readable, significant
 
+if TYPE_CHECKING:  # which is made of what stands here
+    from discover.loop.loop_result import LoopResult
+
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
 _SETTLED = 0.95  # Probability from which on nothing is said of other laws
 
@@ -49,7 +52,7 @@ _NOT_TESTED = {
 }
 
 
-def loop_answer(result: Any) -> Answer:
+def loop_answer(result: "LoopResult") -> Answer:
     """Return the answer of a closed loop."""
     following = what_to_measure_next(result)
     if result.verdict == "no_signal":
@@ -103,6 +106,7 @@ def loop_answer(result: Any) -> Answer:
         return modes.at_use(answer)
     answer = modes.at_use(replace(answer, equation=equation))
     notes = *equation.notes, *answer.lines
+    assert answer.equation is not None  # which stays, at another temperature
     return replace(answer, equation=replace(answer.equation, notes=notes))
 
 
@@ -116,7 +120,7 @@ def _scatter(records: Sequence[RunRecord]) -> str:
     return f" of {noise} Pa rms; the sample's mean stress is below {most} Pa (95 %)"
 
 
-def _falls_above(result: Any) -> str:
+def _falls_above(result: "LoopResult") -> str:
     """Return the rate above which the law's flow curve falls, as it was measured; empty of none."""
     spread = result.spread_of_laws.get("sigma12")
     if spread is None or spread.falls_above is None:
@@ -136,7 +140,7 @@ def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
     return dict(sorted(found.items(), reverse=True))
 
 
-def _shown(result: Any) -> tuple[Equation | None, list[str]]:
+def _shown(result: "LoopResult") -> tuple[Equation | None, list[str]]:
     """Return a law that cannot be written out as a page shows it, constants at the mean mode.
 
     And the equations of effects that are in its h, but no sum of terms.
@@ -168,7 +172,7 @@ def rest_of_h(equations: Sequence[str]) -> str:
     return "\n".join([*([law] if summands else []), *where])
 
 
-def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
+def _of_material(result: "LoopResult", material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
     to_noise = result.verdict in EXPLAINED
@@ -193,7 +197,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
     return replace(answer, written=written | {"formula": material.formula})
 
 
-def _failed(result: Any) -> str:
+def _failed(result: "LoopResult") -> str:
     """Return what the law was not tested by."""
     if untested := untested_by(result):
         held_out = any(record.held_out for record in result.records)
@@ -201,7 +205,7 @@ def _failed(result: Any) -> str:
     return ""
 
 
-def _alternative(result: Any) -> str:
+def _alternative(result: "LoopResult") -> str:
     """Return what describes the same, or is the next likeliest; empty where the law is settled."""
     if twin := result.remaining.get("oil_twin"):
         thick, rises = significant(twin["viscosity"], 3), significant(twin["rise_time"], 2)
@@ -220,7 +224,7 @@ def _alternative(result: Any) -> str:
     return ""
 
 
-def _best_classical(result: Any) -> tuple[str, float] | None:
+def _best_classical(result: "LoopResult") -> tuple[str, float] | None:
     """Return the best law of the field, in words, and its error, for a sum without a name."""
     if (near := result.nearest_law) is None:
         return None
@@ -230,7 +234,9 @@ def _best_classical(result: Any) -> tuple[str, float] | None:
     return f"{', '.join(said)}{falls}", near.size
 
 
-def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
+def _law(
+    result: "LoopResult", equation: Equation | None
+) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
     # as their equations stand (`discover.effects.registry`)
@@ -296,7 +302,7 @@ def _falls(rate: Float[np.ndarray, " n"]) -> bool:
     return bool(abs(last) < 0.5 * max(ways) and swings_past < 0.2 * max(ways))
 
 
-def shows_a_derivative(result: Any) -> bool:
+def shows_a_derivative(result: "LoopResult") -> bool:
     """Return whether runs determine the convected derivative of a law without a nonlinear term.
 
     Its σ12 in shear is the linear one, so it takes a normal stress or an extension, or that nothing
@@ -337,7 +343,7 @@ def _of_function(found: FreeForm) -> Suspect:
     return Suspect(found.title, (Constant("reading", share, (low, high), meaning=where),))
 
 
-def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
+def _of_stage(result: "LoopResult", stage: Stage) -> tuple[Constant, ...]:
     """Return the constants of an effect that was added, with letters that no other has."""
     letters = result.letters.get(stage.effect, {})
     return _constants(stage.parameters, stage.left_open, stage.effect, letters)

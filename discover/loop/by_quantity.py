@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri
@@ -14,6 +14,9 @@ from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.statistics.noise.noise_model import rms
 from discover.words import counted, listed, percent_of, significant
+
+if TYPE_CHECKING:  # which is made of what stands here
+    from discover.loop.loop_result import LoopResult
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
@@ -41,7 +44,7 @@ def of_fitted(records: Sequence[RunRecord], error: float, noise: float) -> Discr
     return Discrepancy(size, (size, size), by_run)
 
 
-def with_unseen(result: Any) -> Discrepancy | None:
+def with_unseen(result: "LoopResult") -> Discrepancy | None:
     """Return the discrepancy of a closed loop, of all unseen runs in the range if there are any."""
     if result.discrepancy is None:
         return None
@@ -61,16 +64,19 @@ def with_unseen(result: Any) -> Discrepancy | None:
     )
 
 
-def _met_up_to(result: Any, by_run: Mapping[str, float]) -> str:
+def _met_up_to(result: "LoopResult", by_run: Mapping[str, float]) -> str:
     """Return the rate up to which all runs meet the tolerance; empty where all do, or none."""
     own = sorted((r for r in result.records if r.name in by_run), key=lambda r: r.fastest)
     missed = [r.fastest for r in own if by_run[r.name] > result.tolerance]
     met = [r for r in own if missed and FASTER * r.fastest < missed[0]]
     several = len(by_temperature(own)) > 1 or len({(r.flow, r.quantity) for r in own}) > 1
-    return "" if several or not met else f"{span((met[-1].unshifted.fastest,) * 2)} 1/s"
+    if several or not met:
+        return ""
+    rate = met[-1].unshifted.fastest
+    return f"{span((rate, rate))} 1/s"
 
 
-def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
+def unseen_errors(result: "LoopResult", kind: str = "") -> dict[str, float]:
     """Return errors without noise, by name of runs left out in turn, and of those held out.
 
     `kind`: quantity of `QUANTITIES` that these record; by default all of them.
@@ -89,7 +95,7 @@ def unseen_errors(result: Any, kind: str = "") -> dict[str, float]:
     return {name: error for name, error in found.items() if name in own}
 
 
-def _held_inside(result: Any) -> list[RunRecord]:
+def _held_inside(result: "LoopResult") -> list[RunRecord]:
     """Return runs held out of flows, quantities and rates that were fitted."""
     fitted = [record for record in result.records if not record.held_out]
     kinds = {(record.flow, record.quantity) for record in fitted}
@@ -104,7 +110,7 @@ def _held_inside(result: Any) -> list[RunRecord]:
     ]
 
 
-def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
+def errors_by_quantity(result: "LoopResult") -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
@@ -117,7 +123,7 @@ def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
     return found
 
 
-def _by_law(result: Any, kind: str) -> ExpectedError:
+def _by_law(result: "LoopResult", kind: str) -> ExpectedError:
     """Return what is known of a stress that nothing measured: by how much equally good laws differ.
 
     No number is an error of what nothing tested. N2 is that of the law, unless they differ.
@@ -144,25 +150,25 @@ def _by_law(result: Any, kind: str) -> ExpectedError:
 _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
 
 
-def normal_stress_settled(result: Any) -> bool:
+def normal_stress_settled(result: "LoopResult") -> bool:
     """Return whether laws that describe the runs as well have one N1: more than linear response."""
     apart = differing(result, "N1")
     only_linear = all(record.control == "oscillation" for record in result.records)
     return apart is not None and apart < _APART and not only_linear
 
 
-def missed_size(result: Any) -> float:
+def missed_size(result: "LoopResult") -> float:
     """Return by how much a law misses the runs besides noise, zero where it does not."""
     missed = with_unseen(result)
     return 0.0 if missed is None else float(missed.size or 0.0)
 
 
-def differing(result: Any, kind: str) -> float | None:
+def differing(result: "LoopResult", kind: str) -> float | None:
     """Return by how much laws that fit as well differ in a quantity in the range."""
     return _spread(result, kind)[0]
 
 
-def _spread(result: Any, kind: str) -> tuple[float | None, float | None]:
+def _spread(result: "LoopResult", kind: str) -> tuple[float | None, float | None]:
     found = result.spread_of_laws.get(kind)
     if found is None:
         return None, None
@@ -174,7 +180,7 @@ def _spread(result: Any, kind: str) -> tuple[float | None, float | None]:
     return inside, beyond
 
 
-def of_stress(result: Any) -> ExpectedError:
+def of_stress(result: "LoopResult") -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
     errors = unseen_errors(result, "sigma12")
     inside = _mean([*errors.values()])
@@ -191,7 +197,7 @@ def of_stress(result: Any) -> ExpectedError:
     return ExpectedError(inside, beyond, at, note=note, spread=spread)
 
 
-def measured(result: Any, kind: str) -> ExpectedError | None:
+def measured(result: "LoopResult", kind: str) -> ExpectedError | None:
     """Return the error of what was measured of a quantity, fitted or not; None without."""
     return of_records((*result.records, *result.unfitted), kind, result.noise_floor)
 

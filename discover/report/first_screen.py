@@ -69,7 +69,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 def _fitted(answer: Answer) -> str:
     """Return in which flows constants were fitted, and at which temperature times hold."""
     flows = f"fitted in {sentences.flows_of(answer.range.flows)}"
-    at = f"; times are for {modes.reduced_to(answer)}" * bool(answer.shift_factors)
+    at = f"; times are for {modes.reduced_to(answer.temperature_C)}" * bool(answer.shift_factors)
     return f" ({flows}{at})" * any(one.ci95 is not None for one in answer.constants)
 
 

@@ -81,7 +81,8 @@ def write_loop(
         kinds=KINDS,
         remaining=remaining_rows(result),
         small_faults=SMALL_FAULTS,
-        reference=reduced_to(result) * any(one.shift != 1.0 for one in result.records),
+        reference=reduced_to(result.temperature_C)
+        * any(one.shift != 1.0 for one in result.records),
         pictures=drawn,
         run=run
         or made_by(
