@@ -1,7 +1,7 @@
 """Quantities of a block in SI units: its columns, what follows from them, what its header says."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import NamedTuple
@@ -25,15 +25,25 @@ INSTRUMENT = {
 }  # fmt: skip
 # a column of strain may be called the one or the other by who gives its unit
 SAME = {"strain": "strain_amplitude", "strain_amplitude": "strain"}
-# coefficients, the rate that they belong to, and its power
-_TIMES_RATE = {
-    "stress": ("viscosity", "shear_rate", 1),
-    "tensile_stress": ("extensional_viscosity", "hencky_rate", 1),
-    "N1": ("psi1", "shear_rate", 2),
-    "N2": ("psi2", "shear_rate", 2),
-}
-
 Values = Float[np.ndarray, " n"]
+
+# what follows from a column and other quantities, and how
+_FORMULAS: tuple[tuple[str, tuple[str, ...], Callable[..., Values]], ...] = (
+    ("phase_angle", ("loss_factor",), np.arctan),
+    ("Gp", ("complex_modulus", "phase_angle"), lambda size, angle: size * np.cos(angle)),
+    ("Gpp", ("complex_modulus", "phase_angle"), lambda size, angle: size * np.sin(angle)),
+    ("Gp", ("complex_viscosity", "omega", "phase_angle"), lambda eta, w, a: eta * w * np.cos(a)),
+    ("Gpp", ("complex_viscosity", "omega", "phase_angle"), lambda eta, w, a: eta * w * np.sin(a)),
+    ("Gp", ("Gpp", "phase_angle"), lambda loss, angle: loss / np.tan(angle)),
+    ("Gpp", ("Gp", "phase_angle"), lambda storage, angle: storage * np.tan(angle)),
+    ("strain_amplitude", ("strain",), np.asarray),
+    ("strain_amplitude", ("stress_amplitude", "Gp", "Gpp"), lambda s, g, h: s / np.hypot(g, h)),
+    ("stress", ("viscosity", "shear_rate"), np.multiply),
+    ("tensile_stress", ("extensional_viscosity", "hencky_rate"), np.multiply),
+    ("tensile_stress", ("viscosity", "hencky_rate"), np.multiply),
+    ("N1", ("psi1", "shear_rate"), lambda psi, rate: psi * rate**2),
+    ("N2", ("psi2", "shear_rate"), lambda psi, rate: psi * rate**2),
+)
 
 
 class _Column(NamedTuple):
@@ -206,36 +216,15 @@ class Readings:
         if source in self.columns and self.geometry is not None:
             factor = self.geometry.per_signal(key)
             return None if factor is None else self._column(source) * factor
-        if key in ("Gp", "Gpp"):
-            return self._modulus(np.cos if key == "Gp" else np.sin)
-        if key == "strain_amplitude":
-            if "strain" in self.columns:
-                return self._column("strain")
-            size, storage, loss = map(self.get, ("stress_amplitude", "Gp", "Gpp"))
-            if size is None or storage is None or loss is None:
-                return None
-            return size / np.hypot(storage, loss)
-        source, rate_key, power = _TIMES_RATE.get(key, ("", "", 0))
-        # a viscosity alone beside a Hencky rate is one of extension
-        alone = "hencky_rate" in self.columns and "shear_rate" not in self.columns
-        if key == "tensile_stress" and alone and source not in self.columns:
-            source = "viscosity"
-        rate = self.get(rate_key) if source in self.columns else None
-        return None if rate is None else self._column(source) * rate**power
-
-    def _modulus(self, part: np.ufunc) -> Values | None:
-        """Return the part of |G*|, |η*| ω or the other modulus that the angle of loss gives."""
-        angle = self.alone("phase_angle")
-        if angle is None and (factor := self.alone("loss_factor")) is not None:
-            angle = np.arctan(factor)
-        size = None if angle is None else self.alone("complex_modulus")
-        if angle is not None and size is None and "complex_viscosity" in self.columns:
-            omega = self.get("omega")
-            size = None if omega is None else self._column("complex_viscosity") * omega
-        for key, own in (("Gp", np.cos), ("Gpp", np.sin)):
-            if angle is not None and size is None and key in self.columns:
-                size = self._column(key) / own(angle)
-        return None if angle is None or size is None else size * part(angle)
+        for made, (first, *others), formula in _FORMULAS:
+            # a viscosity alone beside a Hencky rate is one of extension
+            shear = first == "viscosity" and "shear_rate" in self.columns
+            if made != key or first not in self.columns or (key == "tensile_stress" and shear):
+                continue
+            given = [self.get(one) for one in others]
+            if all(values is not None for values in given):
+                return formula(self._column(first), *given)
+        return None
 
     def _constant(self, key: str) -> float | None:
         if (found := self._find_constant(key)) is None:
