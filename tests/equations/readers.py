@@ -7,6 +7,14 @@ import re
 import numpy as np
 import pytest
 import sympy
+from independent import (
+    ExtendedPomPom,
+    FenePeterlin,
+    Giesekus,
+    PhanThienTanner,
+    UpperConvectedMaxwell,
+)
+from independent.named import material
 from scipy.integrate import solve_ivp
 from sympy.parsing.latex import parse_latex
 
@@ -181,90 +189,56 @@ def integrated(rates, gradient, times, modes=2, variables=0, tolerance=1e-8):
     return total
 
 
-class RheoToolMode:
-    """A mode by rheoTool's sources (Oldroyd_B.C, Giesekus.C, PTT.C, XPomPom.C, WhiteMetznerCY.C and
-    Saramito.C in the stress, FENE_P.C and RoliePoly.C in the conformation), of the entries of a
-    ``constitutiveProperties`` dictionary alone."""
+def rheotool_law(entries, block):
+    """Return the law that rheoTool's sources have for the entries of a mode.
 
-    def __init__(self, block):
-        found = dict(re.findall(r"^\s*(\w+)\s.*?(\S+);$", block, re.M))
-        number = re.compile(r"-?[\d.]+(e-?\d+)?")
-        self.e = {n: float(v) if number.fullmatch(v) else v for n, v in found.items()}
-        self.type, self.block = self.e["type"], block
-        self.in_conformation = self.type in ("FENE-P", "Rolie-Poly")
-        self.start = np.zeros((3, 3))
-        if self.in_conformation:
-            self.start = np.eye(3)
-
-    def spring(self, trace):
-        """Return the spring's factor at a trace of the conformation."""
-        if self.type == "FENE-P":
-            return 1 / (1 - trace / self.e["L2"])
-        squared, m = trace / 3.0, self.e["chiMax"] ** 2
-        if m <= 1.0:
-            return 1.0
-        return (3 - squared / m) * (1 - 1 / m) / ((1 - squared / m) * (3 - 1 / m))
-
-    def stress(self, state):
-        if not self.in_conformation:
-            return state
-        trace, time = np.trace(state), self.e["lambda" if self.type == "FENE-P" else "lambdaD"]
-        if self.type == "FENE-P":
-            a = self.e["L2"] / (self.e["L2"] - 3)
-            return self.e["etaP"] / time * (self.spring(trace) * state - a * np.eye(3))
-        return self.e["etaP"] / time * self.spring(trace) * (state - np.eye(3))
-
-    def rate(self, state, gradient):
-        e, one, trace = self.e, np.eye(3), np.trace(state)
-        twice, convected = gradient + gradient.T, gradient @ state + state @ gradient.T
-        if self.type == "FENE-P":
+    Of Oldroyd_B.C, Giesekus.C, PTT.C, XPomPom.C, WhiteMetznerCY.C, Saramito.C, RoliePoly.C and
+    FENE_P.C, term by term; the last has its springs over those at rest, a, in modulus and time.
+    """
+    e, kind = entries, entries["type"]
+    time = e[{"Rolie-Poly": "lambdaD", "XPomPom": "lambdaB"}.get(kind, "lambda")]
+    mode = e["etaP"] / time, time
+    match kind:
+        case "Oldroyd-B":
+            return UpperConvectedMaxwell(*mode)
+        case "Giesekus":
+            return Giesekus(e["alpha"], *mode)
+        case "PTT":
+            return PhanThienTanner(e["epsilon"], e["destructionFunctionType"], e["zeta"], *mode)
+        case "FENE-P":
             a = e["L2"] / (e["L2"] - 3)
-            return convected - (self.spring(trace) * state - a * one) / e["lambda"]
-        if self.type == "Rolie-Poly":
-            m1 = 2 * (1 - np.sqrt(3 / trace)) / e["lambdaR"] * self.spring(trace)
-            released = e["beta"] * (trace / 3) ** e["delta"] * (state - one)
-            return convected - (state - one) / e["lambdaD"] - m1 * (state + released)
-        eta = e["etaP"]
-        if self.type == "XPomPom":
-            time = e["lambdaB"]
-            stretch = np.sqrt(1 + trace * time / (3 * eta))
-            f = 2 * time / e["lambdaS"] * np.exp(2 / e["q"] * (stretch - 1)) * (1 - 1 / stretch)
-            f += (1 - e["alpha"] / 3 * np.trace(state @ state) * (time / eta) ** 2) / stretch**2
-            left = f / time * state + e["alpha"] / eta * state @ state
-            return convected - left - eta / time**2 * (f - 1) * one + eta / time * twice
-        if self.type == "WhiteMetznerCY":
-            size = np.sqrt(2) * np.linalg.norm(twice / 2)
-            viscosity = eta * (1 + (e["K"] * size) ** e["a"]) ** ((e["n"] - 1) / e["a"])
-            time = e["lambda"] * (1 + (e["L"] * size) ** e["b"]) ** ((e["m"] - 1) / e["b"])
-            return convected - state / time + viscosity / time * twice
-        time = e["lambda"]
-        change = convected + eta / time * twice
-        if self.type == "Saramito":
+            return FenePeterlin(e["L2"], a * mode[0], time / a)
+        case "XPomPom":
+            return ExtendedPomPom(e["q"], e["alpha"], e["lambdaS"], *mode)
+        case "WhiteMetznerCY":
+            assert (e["K"], e["n"], e["a"]) == (e["L"], e["m"], e["b"])
+            assert e["a"] == 2.0
+            return material("white_metzner", {"k": e["K"] / time, "n": e["n"]}, *mode)
+        case "Saramito":
             assert e["PTTfunction"] == "none"
-            assert "(1 1 1);" in self.block
-            size = np.linalg.norm(state - trace / 3 * one) / np.sqrt(2)
-            return change - max(0.0, (size - e["tau0"]) / (eta * size + 1e-16)) * eta / time * state
-        if self.type == "Giesekus":
-            return change - e["alpha"] / eta * state @ state - state / time
-        if self.type == "PTT":
-            change = change - 0.5 * e["zeta"] * (state @ twice + twice @ state)
-            z = e["epsilon"] * time / eta * trace
-            linear = {"linear": True, "exponential": False}[e["destructionFunctionType"]]
-            return change - (1 + z if linear else np.exp(z)) * state / time
-        assert self.type == "Oldroyd-B"
-        return change - state / time
+            assert "(1 1 1);" in block
+            return material("saramito", {"yield_strain": e["tau0"] / mode[0]}, *mode)
+    assert (kind, e["delta"]) == ("Rolie-Poly", -0.5)
+    known = {"stretch_time_ratio": e["lambdaR"] / time, "beta": e["beta"]}
+    if e["chiMax"] > 1.0:
+        return material("rolie_poly_fene", known | {"maximum_stretch": e["chiMax"]}, *mode)
+    return material("rolie_poly", known, *mode)
 
 
 def rheotool_modes(text):
+    """Return entries and law of each mode of a ``constitutiveProperties`` dictionary."""
+    number, modes = re.compile(r"-?[\d.]+(e-?\d+)?"), []
     blocks = re.findall(r"M\d+\s*\{(.*?)\}", text, re.S)
-    return [RheoToolMode(block) for block in blocks or [text[text.index("parameters\n") :]]]
+    for block in blocks or [text[text.index("parameters\n") :]]:
+        found = dict(re.findall(r"^\s*(\w+)\s.*?(\S+);$", block, re.M))
+        entries = {n: float(v) if number.fullmatch(v) else v for n, v in found.items()}
+        modes.append((entries, rheotool_law(entries, block)))
+    return modes
 
 
 def by_rheotool(text, gradient, times):
     """Return the stress of all modes and the solvents at the times, from rest."""
-    total = 0.0
-    for mode in rheotool_modes(text):
-        states = followed(mode.rate, mode.start, gradient, times, atol=1e-10)
-        total = total + np.array([mode.stress(state) for state in states])
-        total = total + mode.e["etaS"] * (gradient + gradient.T)
-    return total
+    twice = gradient + gradient.T
+    return sum(
+        law.held(gradient, times) + entries["etaS"] * twice for entries, law in rheotool_modes(text)
+    )

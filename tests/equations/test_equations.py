@@ -117,7 +117,7 @@ def test_the_springs_of_fene_p_go_to_rheotool_from_its_terms():
 def test_density_and_a_relaxation_that_was_learned_go_to_rheotool():
     equation = equations.Equation((LawTerm("sigma.sigma", 0.2),), (9.0, 3.0), (0.5, 5.0))
     text = equations.write_equation(equation, "rheotool", density_kg_m3=900.0)
-    assert [mode.e["rho"] for mode in rheotool_modes(text)] == [900.0, 900.0]
+    assert [entries["rho"] for entries, _ in rheotool_modes(text)] == [900.0, 900.0]
     model = rheotool_model(equations.Equation((LawTerm("sigma", 0.98),), linear_relaxation=False))
     assert (model.type, model.relax) == ("Oldroyd-B", 0.98)
 

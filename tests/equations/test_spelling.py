@@ -102,8 +102,8 @@ def _physical_rate(equation, stress, gradient):
 
 def _rheotool_rate(text, stress, gradient):
     """The same by rheoTool's sources."""
-    (mode,) = rheotool_modes(text)
-    return mode.rate(stress, gradient) - gradient @ stress - stress @ gradient.T
+    ((_, law),) = rheotool_modes(text)
+    return law.stress_change(stress, gradient) - gradient @ stress - stress @ gradient.T
 
 
 TAKEN = {
