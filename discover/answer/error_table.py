@@ -56,7 +56,7 @@ def errors(answer: "Answer") -> list[Errors]:
             measured.append(Row(symbol, one.note, _inside(answer, one), beyond, at))
         if near or far:
             apart = True
-            seen = _NOT_MEASURED if one.inside is None else "tested, above"
+            seen = _NOT_MEASURED if one.inside is None else "see above"
             by_law.append(Row(symbol, one.note * bool(near), near or seen, far))
         elif not one.is_known:
             row = Row(symbol, "", one.note or one.missing, None)
@@ -72,7 +72,7 @@ def errors(answer: "Answer") -> list[Errors]:
         measured.append(Row(f"{of}best classical law", near, percent_of(error)))
     is_far = any(row.beyond for row in measured)
     heads = (_INSIDE, _TWICE) if apart else ("", "")
-    title = f"{_UNTESTED}{': spread between equally good laws (not an error)' * apart}"
+    title = f"{_UNTESTED}{'; spread between equally good laws (not an error)' * apart}"
     first = (_INSIDE, _BEYOND * is_far)
     blocks = Errors(_title(answer), first, measured), Errors(title, heads, by_law)
     return [one for one in blocks if one.rows]

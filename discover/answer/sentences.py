@@ -13,7 +13,7 @@ _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
 # many), and how brief the rest is
 _SHORTER = (
-    *((3, 0), (3, 1), (2, 1), (1, 1), (1, 2), (1, 3), (0, 3)),
+    *((3, 0), (3, 1), (2, 1), (1, 1), (1, 2), (1, 3), (1, 4), (0, 3)),
     *((-1, brief) for brief in range(2, 6)),
 )
 
@@ -127,7 +127,7 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", *modes.OF_SWEEP)
 def description(answer: "Answer", brief: int = 0) -> str:
     """Return how well the law describes the runs, and if that is enough.
 
-    `brief`: 1 without the worst run, 2 without interval, 4 without whose errors several are and
+    `brief`: 1 without the worst run, 2 without interval, 3 without whose errors several are and
     what these lack.
     """
     if not answer.title:
@@ -188,11 +188,11 @@ def _of_unseen(answer: "Answer", each: Mapping[str, Any], size: str, brief: int)
     told, in_shear = [], answer.range.flows == ("shear",)
     for symbol, one in each.items():
         known = of_worst * (in_shear and symbol == "σ12")
-        if one.uncorrected and brief < 4:
+        if one.uncorrected and brief < 3:
             known = [*known, f"not corrected for {one.uncorrected}"]
         behind = f" ({', '.join(known)})" * bool(known)
         told.append(f"{symbol} {at_most(one.inside)}{behind}")
-    data = " on unseen data" * (brief < 4)
+    data = " on unseen data" * (brief < 3)
     return f"Mean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
@@ -205,12 +205,12 @@ def _misses(answer: "Answer") -> bool:
 def left_out(answer: "Answer", brief: int = 0) -> str:
     """Return what of the instrument is no part of the fluid, and so of no simulation.
 
-    `brief`: from 3 on of several no names, from 5 on nothing: the table has them.
+    `brief`: from 4 on of several no names, from 5 on nothing: the table has them.
     """
     names = [effect_title(one.effect) for one in answer.suspects]
     if not names or brief > 4:
         return ""
-    told = listed(names) if brief < 3 or len(names) == 1 else f"{len(names)} measurement errors"
+    told = listed(names) if brief < 4 or len(names) == 1 else f"{len(names)} measurement errors"
     return f"Leave out of simulations: {told} (instrument)."
 
 
@@ -284,9 +284,16 @@ def where(answer: "Answer") -> str:
     only = " only" * (len(quantities) == 1 and not implied)
     place = _in_part(answer, place) or f", {place}"
     comma = "," * bool(only and not place.startswith(","))
-    falls = f"Not for steady flow above {answer.falls_above}, where its flow curve falls."
-    said = f"{use}{only}{comma}{place}.", falls * bool(answer.falls_above), implied
+    said = f"{use}{only}{comma}{place}.", _unsteady(answer), implied
     return " ".join(filter(None, said))
+
+
+def _unsteady(answer: "Answer") -> str:
+    """Return from which rate on the law predicts no steady flow; empty where it does at each."""
+    temperatures = [*answer.range.by_temperature]
+    at = f" at {modes.degrees(temperatures[0])}" if len(temperatures) == 1 else ""
+    above = answer.falls_above.removesuffix(at)  # which was said
+    return f"No steady flow above {above} (falling flow curve)." if above else ""
 
 
 def _in_part(answer: "Answer", place: str) -> str:

@@ -131,7 +131,7 @@ def _of_sweep(result: "LoopResult") -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            are = f"{OF_SWEEP[name]} are {Constant(name, one.value, one.ci95).number} times"
+            are = f"{OF_SWEEP[name]} are {Constant(name, one.value, one.ci95).number} ×"
             return f"Measure sweep and runs on one loading: the runs' {are} the sweep's."
     return ""
 

@@ -211,7 +211,7 @@ def test_a_sweep_of_other_moduli_than_the_runs_is_repeated_on_their_loading():
         ("relaxation_time_factor", "relaxation times"),
     ):
         assert what_to_measure_next(close(declared_parameters={name: factor})) == (
-            f"{again}{what} are 0.52 times the sweep's."
+            f"{again}{what} are 0.52 × the sweep's."
         )
     # one next to one, within the tolerance of 10 %, one that is no value; and without a sweep
     others = [{"modulus_factor": replace(factor, ci95=ends)}

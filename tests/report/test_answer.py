@@ -29,7 +29,7 @@ def test_the_first_line_has_law_constants_error_and_range():
         "for σ12 only, 0.003–3 1/s. Leave out of simulations: stress gain (instrument)."
     )
     falls = headline(falls_above="1 1/s")
-    assert "0.003–3 1/s. Not for steady flow above 1 1/s, where its flow curve falls." in falls
+    assert "0.003–3 1/s. No steady flow above 1 1/s (falling flow curve)." in falls
     useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
     assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
     # the worst run is said once: with the range up to which each run meets the tolerance
