@@ -39,6 +39,7 @@ from discover.loop.parts import (
 from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
 from discover.loop.sentences import EXPLAINED
+from discover.statistics import HALF_BAND
 from discover.statistics.noise.whiteness import noise_beside
 from discover.words import percent_of
 
@@ -73,6 +74,31 @@ class Ended(Path):
             ends, value = self.posterior.interval(at), float(self.fit.theta[at])
             low, high = (value, value) if ends is None else ends
             found[at] = min(low, value), max(high, value)
+        for name in self._tied:
+            at = self.posterior.problem.model.positions(name)[0]
+            value, (_, high), prior = float(self.fit.theta[at]), found[at], self.fit.priors[at]
+            off = float(np.exp(high / value - 1.0))
+            found[at] = value / off, min(value * off, prior.high)
+        return found
+
+    @cached_property
+    def _tied(self) -> set[str]:
+        """Effects whose amplitude only goes with their other constants, as a rate with its time.
+
+        Alone it might be none by its interval, and is not where these are known. Then its order
+        alone is known, as theirs is: what is normal along such a ridge is the logarithm.
+        """
+        fit, found = self.fit, set()
+        for name in fit.names:
+            first, *others = self.posterior.problem.model.positions(name)
+            at = [fit.free.index(one) for one in (first, *others) if one in fit.free]
+            if not others or len(at) < 2 or fit.covariance is None:
+                continue
+            known = np.linalg.inv(fit.covariance[np.ix_(at, at)])
+            value, alone = float(fit.theta[first]), HALF_BAND * float(known[0, 0]) ** -0.5
+            (low, high) = self.posterior.interval(first) or (value, value)
+            if low <= 0.0 < value - alone and high > value:
+                found.add(name)
         return found
 
     @cached_property
@@ -183,13 +209,14 @@ class Ended(Path):
             (name,) = set(after.names) - set(before.names)
             effect, model = self.posterior.problem.effects[name], self.posterior.problem.model
             at = dict(zip((p.name for p in effect.parameters), model.positions(name), strict=True))
-            parameters, left_open = {}, []
+            parameters, left_open = {}, [p.name for p in effect.parameters if name in self._tied]
             for p in effect.parameters:
                 place = at[p.name]
                 value = float(self.fit.theta[place])
                 end = end_of_range(value, float(model.low[place]), float(model.high[place]))
                 parameters[p.name] = StageParameter(value, self.bounds[place], p.unit, at_end=end)
-                if parameters[p.name].is_open_up_to(float(model.high[place])):
+                open_up = parameters[p.name].is_open_up_to(float(model.high[place]))
+                if open_up and p.name not in left_open:
                     left_open.append(p.name)
             if name in self.by_mode:
                 parameters[effect.parameters[0].name] = self.by_mode[name]

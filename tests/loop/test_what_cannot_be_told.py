@@ -223,17 +223,16 @@ def test_an_inertia_behind_the_motor_is_a_solvent_beside_the_mode():
     assert found == {name: pytest.approx(value, rel=1e-12) for name, value in exact.items()}
 
 
-def in_flow_curve(law, declared):
-    """Return the effects that a flow curve of a fluid of the field needs, with 1 % noise."""
+def in_flow_curve(law, declared, effects=("giesekus_mobility", "wall_slip", "ptt_linear")):
+    """Return what a loop finds in a flow curve with 1 % noise."""
     rates = np.geomspace(0.05, 50.0, 25)
     drawn = 1.0 + 0.01 * np.random.default_rng(5).standard_normal(25)
     curve = np.array([law(rate) for rate in rates]) * drawn
     run = dc.Run("flow_curve.csv", np.arange(1.0, 26.0), steady_rates(rates), rates, curve)
-    effects = ["giesekus_mobility", "wall_slip", "ptt_linear"]
-    return run_loop(dc.Dataset("made", (run,)), declared, effects=effects, max_effects=2)
+    return run_loop(dc.Dataset("made", (run,)), declared, effects=list(effects), max_effects=2)
 
 
-@pytest.mark.parametrize("alpha", [0.3, 0.5])
+@pytest.mark.parametrize("alpha", [0.3, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_a_giesekus_flow_curve_slips_at_no_wall_where_modulus_and_time_are_fitted(alpha):
     declared = replace(TO_FIT, modulus=np.array([3.6]), relaxation_time=np.array([0.6]))
     result = in_flow_curve(lambda rate: Giesekus(alpha, 100.0).steady_shear(rate)[0], declared)
@@ -254,3 +253,38 @@ def test_slip_of_a_flow_curve_is_told_where_modulus_and_time_are_known():
 
     result = in_flow_curve(slips, DECLARED)
     assert "wall_slip" in [stage.effect for stage in result.stages]
+
+
+def structure(result):
+    (stage,) = result.stages
+    assert stage.effect == "thixotropy"
+    return stage.left_open, [one.ci95 for one in stage.parameters.values()]
+
+
+def softened(rate, times):
+    """Return s σ of a Maxwell fluid, ds/dt = (1 − s)/t_b − k γ̇ s with k = 0.25 and t_b = 2 s."""
+    decay = 0.5 + 0.25 * rate
+    level = 0.5 / decay
+    s = level + (1.0 - level) * np.exp(-decay * times)
+    return s * 100.0 * rate * -np.expm1(-times)
+
+
+def test_a_flow_curve_tells_the_product_of_breakdown_and_build_up_time_and_neither_alone():
+    result = in_flow_curve(lambda rate: softened(rate, np.inf), DECLARED, ["thixotropy"])
+    left_open, (breakdown, time) = structure(result)
+    assert left_open == ("breakdown", "build_up_time")
+    assert breakdown[0] < 0.25 < breakdown[1]
+    assert time[0] < 2.0 < time[1]
+    assert not any(one.determined for one in result.answer.constants)
+
+
+def test_start_ups_tell_breakdown_and_build_up_time():
+    rates = (0.3, 1.0, 3.0)
+    drawn = np.random.default_rng(0)
+    stresses = [white(softened(rate, TIMES), 0.01, drawn) for rate in rates]
+    runs = [run_at(rate, TIMES, own) for rate, own in zip(rates, stresses, strict=True)]
+    result = run_loop(dc.Dataset("made", tuple(runs)), DECLARED, effects=["thixotropy"])
+    left_open, ends = structure(result)
+    assert left_open == ()
+    # to a tenth of it: a hundred samples of each of three runs with noise below 1 %
+    assert [high - low < 0.1 * high for low, high in ends] == [True, True]
