@@ -13,7 +13,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.laws import LAWS
 from discover.loop.answering import LAW_OF_EFFECT
-from discover.loop.loop import Found
+from discover.loop.loop import SearchOutcome
 from discover.loop.task import with_law
 
 _AS_EFFECTS = {"ucm": (), **{law: (effect,) for effect, law in LAW_OF_EFFECT.items()}}
@@ -45,7 +45,7 @@ class ClassicalFit:
 
 
 def fit_classical_laws(
-    found: Found, frame: Frame, further: Sequence[str] = ()
+    found: SearchOutcome, frame: Frame, further: Sequence[str] = ()
 ) -> tuple[ClassicalFit, ...]:
     """Fit the classical laws, and `further` ones, to the training runs; test them in other flows.
 
@@ -68,7 +68,7 @@ def fit_classical_laws(
     return tuple(_result(name, *one, judged, least) for name, one in tried.items())
 
 
-def _with(found: Found, law: str) -> DeclaredModel:
+def _with(found: SearchOutcome, law: str) -> DeclaredModel:
     """Return the declared model with a named law in place of all that is a law in it."""
     declared = found.posterior.problem.declared
     kept = tuple(
@@ -79,7 +79,9 @@ def _with(found: Found, law: str) -> DeclaredModel:
     return with_law(replace(declared, by_mode=(), effects=kept), law)
 
 
-def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
+def _added_to_ucm(
+    found: SearchOutcome, bench: Sequence[AbstractEffect]
+) -> dict[str, tuple[Fitter, Fit]]:
     """Return the classical laws as effects added to upper-convected Maxwell."""
     declared = _with(found, "ucm")
     names = {name for some in _AS_EFFECTS.values() for name in some}
@@ -102,7 +104,7 @@ def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tu
     return best
 
 
-def _of_law(found: Found, name: str, bench: Sequence[AbstractEffect]) -> tuple[Fitter, Fit]:
+def _of_law(found: SearchOutcome, name: str, bench: Sequence[AbstractEffect]) -> tuple[Fitter, Fit]:
     """Return any named law in place of the declared one."""
     declared = _with(found, name)
     problem = found.task.problem(declared, bench)

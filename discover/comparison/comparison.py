@@ -8,7 +8,7 @@ import pandas as pd
 
 from discover.answer import Answer, HasAnswer
 from discover.comparison.classical import ClassicalFit
-from discover.comparison.flows import Band, Flow, Stresses, of_recorded, relative_errors
+from discover.comparison.flows import Flow, FlowBand, Stresses, of_recorded, relative_errors
 from discover.comparison.hypotheses import terms_named
 from discover.comparison.outcome import LearnerOutcome, Placement, place
 from discover.comparison.rivals import Rival
@@ -49,7 +49,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
     before: Mapping[str, Stresses | None]
     outcomes: Mapping[str, LearnerOutcome]
     posterior: LoopResult
-    bands: Mapping[str, Band] = field(default_factory=dict, repr=False)
+    bands: Mapping[str, FlowBand] = field(default_factory=dict, repr=False)
     shares: Mapping[str, float] = field(default_factory=dict)
     truth: Sequence[LawTerm] | None = None
     noise: float | None = None
@@ -125,7 +125,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
         """By how much the network's N1 and N2 are off the posterior's, N2 over N1; the largest."""
         network = self.outcomes.get("tbnn_ude")
         found: dict[str, float] = {}
-        for flow in self.judged:
+        for flow in self.unseen_flows:
             if network is None:
                 break
             own, band = network.predictions[flow.key], self.bands.get(flow.key)
@@ -141,20 +141,20 @@ class Comparison(PageView, HasAnswer, SummaryView):
         """Checks of physical soundness by learner."""
         return {name: outcome.physics for name, outcome in self.outcomes.items()}
 
-    def claimed(self, flow: Flow) -> Band | None:
+    def determined_band(self, flow: Flow) -> FlowBand | None:
         """Return the band of a flow, without limits of what is not determined in it."""
         band = self.bands.get(flow.key)
         if band is None:
             return None
         open_ = [q for q in band.middle if any(s.leaves_open(q, flow) for s in self.statements)]
-        return band.claiming([q for q in band.middle if q not in open_])
+        return band.limited_to([q for q in band.middle if q not in open_])
 
     def flows_of(self, kind: str) -> list[Flow]:
         """Return the flows of one kind."""
         return [flow for flow in self.flows if flow.kind == kind]
 
     @property
-    def judged(self) -> list[Flow]:
+    def unseen_flows(self) -> list[Flow]:
         """Flows that no learner saw and in which something is known."""
         return [flow for flow in self.flows if flow.kind in ("test", "held_out")]
 
@@ -191,7 +191,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
     def errors_table(self) -> pd.DataFrame:
         """Return relative errors in flows that no fit saw, one line for each flow and quantity."""
         lines = {}
-        for flow in self.judged:
+        for flow in self.unseen_flows:
             for who in ("before", *self.outcomes):
                 for quantity, error in of_recorded(self.errors(who, flow), flow).items():
                     lines.setdefault((flow.name, quantity), {})[who] = error
@@ -239,10 +239,10 @@ class Comparison(PageView, HasAnswer, SummaryView):
             holds = name == "tensor_sindy" and self.determined_terms
             learners[name] = {
                 "terms": outcome.terms,
-                "errors": self._errors(name, self.judged),
+                "errors": self._errors(name, self.unseen_flows),
                 "half_widths_of_members": {
                     flow.name: outcome.bands[flow.key].half_widths()
-                    for flow in self.judged
+                    for flow in self.unseen_flows
                     if flow.key in outcome.bands
                 },
                 "training_errors": self._errors(name, self.flows_of("training")),
@@ -255,7 +255,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
             }
         law = self.answer.equation or self.answer.classical
         posterior = self.posterior
-        banded = [(flow, band) for flow in self.judged if (band := self.bands.get(flow.key))]
+        banded = [(flow, band) for flow in self.unseen_flows if (band := self.bands.get(flow.key))]
         content = {
             "study": self.name,
             "verdict": self.verdict,
@@ -266,7 +266,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
             "declared": posterior.declared,
             "seed": self.seed,
             "learners": learners,
-            "before": {"errors": self._errors("before", self.judged)},
+            "before": {"errors": self._errors("before", self.unseen_flows)},
             "posterior": {
                 **posterior.explanations.to_json(),
                 "constants": posterior.declared_parameters,
@@ -288,7 +288,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
             },
             "truth": self.truth,
             "classical": {fit.law: fit for fit in self.classical},
-            "range": {flow.name: self.placement(flow) for flow in self.judged},
+            "range": {flow.name: self.placement(flow) for flow in self.unseen_flows},
             "rivals": self.rivals,
             "undetermined": self.undetermined,
             "network_differs_by": self.disagreement,

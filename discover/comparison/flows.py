@@ -164,7 +164,7 @@ class Flow:
 
 
 @dataclass(frozen=True)
-class Band:
+class FlowBand:
     """σ12 (or what is recorded), N1 and N2 of one flow with their limits, in Pa.
 
     Of a posterior its 95 % band, of an ensemble the lowest and highest member. By quantity, shape
@@ -184,7 +184,7 @@ class Band:
             found[quantity] = float(0.5 * width / size) if size > 0.0 else np.nan
         return found
 
-    def claiming(self, quantities: Sequence[str]) -> "Band":
+    def limited_to(self, quantities: Sequence[str]) -> "FlowBand":
         """Return the band with limits for some quantities alone."""
 
         def of(limits: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -211,7 +211,7 @@ def comparison_flows(
     )  # fmt: skip
     for kind, part, other in kinds:
         known = {name: run for name, run in sound.items() if name not in other.names}
-        there = {f"{run.name} ({one})" for run in part for one in run.beside}
+        there = {f"{run.name} ({one})" for run in part for one in run.also_recorded}
         flows += [run_flow(run, kind, data, known) for run in part if run.name not in there]
     truth = data.truth
     if truth is None:
@@ -251,7 +251,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData, sound: Mapping[str, Run]
         reference = columns_of(recorded_and_normal(run.protocol, exact[run.name].components))
     else:
         reference: dict[str, np.ndarray] = {"sigma12": run.recorded}  # in creep the strain
-        for own in map(run.observing, run.beside):
+        for own in map(run.observing, run.also_recorded):
             if own.name in sound:
                 there = np.isin(own.time, sound[own.name].time)
                 reference[own.quantity] = np.where(there, own.recorded, np.nan)

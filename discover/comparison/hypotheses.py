@@ -6,7 +6,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.flows import MEASURED, Band, Flow, Stresses, columns_of
+from discover.comparison.flows import MEASURED, Flow, FlowBand, Stresses, columns_of
 from discover.dataset import Run
 from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, named_effects
 from discover.equations.parts import combined
@@ -18,7 +18,7 @@ from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.rows import Rows
 from discover.learners.results import RecoveredTerm
 from discover.loop.expected_errors import weighed_laws
-from discover.loop.loop import Found, search
+from discover.loop.loop import SearchOutcome, search
 from discover.loop.task import Say, Task
 from discover.processor import in_one_thread
 from discover.study.data import StudyData
@@ -42,7 +42,7 @@ MOST_EFFECTS = 3
 
 def search_hypotheses(
     study: Study, data: StudyData, declared: StudyModel, library: TermLibrary, say: Say
-) -> Found:
+) -> SearchOutcome:
     """Return the posterior over what a search adds to the known part.
 
     Candidates are every named effect, of fluid and instrument, and every library term. What of the
@@ -53,7 +53,7 @@ def search_hypotheses(
     fit = list(data.fit.names)
     if study.compare.use_normal_stresses:
         for name in data.fit.names:
-            for quantity in runs[name].beside:
+            for quantity in runs[name].also_recorded:
                 also = runs[name].observing(quantity)
                 dataset = replace(dataset, runs=(*dataset.runs, also))
                 fit.append(also.name)
@@ -85,14 +85,14 @@ class Proposed:
 
 
 def with_proposals(
-    found: Found, terms: Mapping[str, Sequence[RecoveredTerm]]
-) -> tuple[Found, dict[str, Proposed]]:
+    found: SearchOutcome, terms: Mapping[str, Sequence[RecoveredTerm]]
+) -> tuple[SearchOutcome, dict[str, Proposed]]:
     """Return the posterior over the search's hypotheses and those of learners, and each of these.
 
     A learner's terms stand beside the instrument of the likeliest hypothesis.
     """
     search, problem = found.posterior.search.copied(), found.posterior.problem
-    alive = search.alive()
+    alive = search.ranked()
     if not alive:
         return found, {name: Proposed(tuple(some)) for name, some in terms.items()}
     best = alive[0]
@@ -149,7 +149,9 @@ def _as_effects(
     return found
 
 
-def _refitted(terms: Sequence[RecoveredTerm], fit: Fit, found: Found) -> tuple[RecoveredTerm, ...]:
+def _refitted(
+    terms: Sequence[RecoveredTerm], fit: Fit, found: SearchOutcome
+) -> tuple[RecoveredTerm, ...]:
     """Return terms with the coefficients of a fit and their 95 % intervals."""
     model, out = found.posterior.problem.model, []
     assert fit.covariance is not None
@@ -169,7 +171,7 @@ def _refitted(terms: Sequence[RecoveredTerm], fit: Fit, found: Found) -> tuple[R
     return tuple(out)
 
 
-def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
+def terms_of(fit: Fit, found: SearchOutcome) -> tuple[LawTerm, ...] | None:
     """Return what a hypothesis adds to the law as library terms; None if it is no such sum.
 
     Of two effects with a term in common the coefficients are added up.
@@ -196,7 +198,9 @@ def terms_named(effects: Iterable[str]) -> set[str]:
 
 
 @in_one_thread
-def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> dict[str, Band]:
+def flow_bands(
+    found: SearchOutcome, flows: Sequence[Flow], runs: Mapping[str, Run]
+) -> dict[str, FlowBand]:
     """Return the band of each flow, by its key; those in which most hypotheses diverge have none.
 
     Where no law is all there is, σ12 is that of laws which predict runs left out best, as in a
@@ -214,15 +218,17 @@ def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> 
         ]
         if some:
             predictions = Predictions(posterior, Rows.of([run for _, run in some]), recorded)
-            of_stress, of_normal = map(predictions.bands, (posterior.predicting_best, weighed))
+            of_stress, of_normal = map(predictions.bands, (posterior.best_predictive_laws, weighed))
             for (flow, _), first, others in zip(some, of_stress, of_normal, strict=True):
                 if first is not None and others is not None:
                     ends = zip(astuple(first), astuple(others), strict=True)
-                    out[flow.key] = Band(*(columns_of(np.c_[a[:, :1], b[:, 1:]]) for a, b in ends))
+                    out[flow.key] = FlowBand(
+                        *(columns_of(np.c_[a[:, :1], b[:, 1:]]) for a, b in ends)
+                    )
     return out
 
 
-def flow_run(flow: Flow, found: Found, runs: Mapping[str, Run]) -> Run:
+def flow_run(flow: Flow, found: SearchOutcome, runs: Mapping[str, Run]) -> Run:
     """Return the run that a flow asks for; one at hand with its steps placed where they are."""
     run = runs.get(flow.name) if flow.kind in MEASURED else None
     if run is None:

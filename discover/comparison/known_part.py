@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from discover.comparison.flows import (
     MEASURED,
-    Band,
     Flow,
+    FlowBand,
     Stresses,
     columns_of,
     comparison_flows,
@@ -22,7 +22,7 @@ from discover.effects import ConstitutiveEffect, KnownEffect, StateEffect
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.loop.final_model import augmented_fluid
-from discover.loop.from_posterior import Ended
+from discover.loop.from_posterior import FinishedSearch
 from discover.loop.task import require_possible
 from discover.study.data import StudyData
 from discover.study.declared_model import StudyModel
@@ -58,10 +58,12 @@ class Frame:
             predictions[flow.key] = self.recorded(flow, predictions[flow.key])
             if (band := bands.get(flow.key)) is not None:
                 ends = (self.recorded(flow, one) for one in (band.middle, band.low, band.high))
-                bands[flow.key] = Band(*ends)  # pyright: ignore[reportArgumentType]
+                bands[flow.key] = FlowBand(*ends)  # pyright: ignore[reportArgumentType]
         return replace(own, predictions=predictions, bands=bands)
 
-    def of_declared(self, declared: StudyModel, ended: Ended) -> dict[str, Stresses | None]:
+    def of_declared(
+        self, declared: StudyModel, ended: FinishedSearch
+    ) -> dict[str, Stresses | None]:
         """Return what the declared model predicts as fitted alone, by the key of the flow."""
         model = _as_fitted(declared, ended, ended.declared_theta)
         _, added = without_instrument(self.data, ended, model.effects, ended.declared_theta)
@@ -71,7 +73,7 @@ class Frame:
 
 def known_part(
     declared: StudyModel,
-    ended: Ended,
+    ended: FinishedSearch,
     data: StudyData,
     high_deborah: tuple[float, ...],
     pipkin: Sequence[tuple[float, float]],
@@ -94,7 +96,9 @@ def known_part(
     return Frame(replace(model, effects=()), without, flows, added, found)
 
 
-def _as_fitted(declared: StudyModel, ended: Ended, theta: Float[np.ndarray, " p"]) -> StudyModel:
+def _as_fitted(
+    declared: StudyModel, ended: FinishedSearch, theta: Float[np.ndarray, " p"]
+) -> StudyModel:
     """Return the declared model with numbers for what was fitted, `theta`.
 
     Its effects of the fluid are in its law, modes and solvent then, and the others are of the
@@ -142,7 +146,7 @@ def _require_terms(known: KnownEffect) -> None:
     )
 
 
-def _found(ended: Ended) -> list[KnownEffect]:
+def _found(ended: FinishedSearch) -> list[KnownEffect]:
     """Return the effects of the instrument in the likeliest hypothesis, with their values."""
     problem = ended.posterior.problem
     return [
@@ -152,10 +156,10 @@ def _found(ended: Ended) -> list[KnownEffect]:
     ]
 
 
-def _dated(ended: Ended, data: StudyData) -> StudyData:
+def _dated(ended: FinishedSearch, data: StudyData) -> StudyData:
     """Return data whose rates step when the posterior says."""
     problem = ended.posterior.problem
-    theta, first = ended.theta_ahead(ended.fit), problem.model.instants.start
+    theta, first = ended.held_out_theta(ended.fit), problem.model.instants.start
     runs = (*problem.fitted.runs, *(() if problem.predicted is None else problem.predicted.runs))
     steps = {run.source: run.rate_steps for run in runs if run.rate_steps}
 
@@ -182,7 +186,10 @@ _NORMAL = ("first_normal_stress_difference", "second_normal_stress_difference")
 
 
 def without_instrument(
-    data: StudyData, ended: Ended, effects: Sequence[KnownEffect], theta: Float[np.ndarray, " p"]
+    data: StudyData,
+    ended: FinishedSearch,
+    effects: Sequence[KnownEffect],
+    theta: Float[np.ndarray, " p"],
 ) -> tuple[StudyData, Mapping[str, Stresses]]:
     """Return data without what the instrument did to them, and what that is, by name of the run.
 

@@ -93,7 +93,7 @@ class Learning:
             def say(text: str, fraction: float, done: float = done, share: float = share) -> None:
                 progress(text, done + share * fraction)
 
-            found |= at_once({learner: part(learner) for learner in group}, say)
+            found |= run_concurrently({learner: part(learner) for learner in group}, say)
         return {learner: found[learner] for learner in learners}
 
     def outcome(self, learner: str, frame: Frame, progress: Progress) -> LearnerOutcome:
@@ -126,7 +126,7 @@ class Learning:
         """Return what a fluid leaves of the runs that have a signal, as the posterior asks it."""
         study, runs = self.study, list(frame.data.fit.runs)
         if study.compare.use_normal_stresses:
-            runs += [run.observing(quantity) for run in runs for quantity in run.beside]
+            runs += [run.observing(quantity) for run in runs for quantity in run.also_recorded]
         runs = [run for run in runs if np.any(run.recorded)]
         if not runs:
             return None
@@ -140,7 +140,9 @@ R = TypeVar("R")
 _LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be interrupted
 
 
-def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
+def run_concurrently(
+    parts: Mapping[str, Callable[[Progress], R]], progress: Progress
+) -> dict[str, R]:
     """Return what each part returns, all computed side by side.
 
     Progress is passed on with the mean of the fractions, of one part at a time. If one part fails,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from discover import identify
-from discover.comparison.flows import DRAWN, QUANTITIES, Band, Flow, Stresses, columns_of
+from discover.comparison.flows import DRAWN, QUANTITIES, Flow, FlowBand, Stresses, columns_of
 from discover.forward import make_batch
 from discover.forward.of_fluids import bare_run, followed, observed, pieces_in_time
 from discover.laws import Fluid
@@ -32,7 +32,7 @@ class LearnerOutcome(TermTables):
     message: str = ""  # one sentence on how the fit ended
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
-    bands: Mapping[str, Band] = field(default_factory=dict)
+    bands: Mapping[str, FlowBand] = field(default_factory=dict)
     left: LackOfFit | None = None  # of the runs that it learned from
 
     @classmethod
@@ -50,7 +50,7 @@ class LearnerOutcome(TermTables):
             "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
             "predictions": {key: own and arrays(own) for key, own in predictions.items()},
             "bands": {
-                key: Band(**{end: arrays(values) for end, values in own.items()})
+                key: FlowBand(**{end: arrays(values) for end, values in own.items()})
                 for key, own in state["bands"].items()
             },
             "left": left,
@@ -60,7 +60,7 @@ class LearnerOutcome(TermTables):
 
 def bands_of_members(
     result: LearnerResult, fluid: Fluid, flows: list[Flow], own: Mapping[str, Stresses | None]
-) -> dict[str, Band]:
+) -> dict[str, FlowBand]:
     """Return what the members of an ensemble span, by flow; `own`: what the whole predicts."""
     if len(result.members) < 2:
         return {}
@@ -72,7 +72,7 @@ def bands_of_members(
         if flow.kind in DRAWN and len(told) == len(members):
             rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
             low, high = ({q: end(v, axis=0) for q, v in rows.items()} for end in (np.min, np.max))
-            bands[flow.key] = Band(told[0], low, high)
+            bands[flow.key] = FlowBand(told[0], low, high)
     return bands
 
 

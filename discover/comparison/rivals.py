@@ -11,7 +11,7 @@ from discover.comparison.outcome import simulated
 from discover.dataset.run import Run
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
-from discover.loop.loop import Found
+from discover.loop.loop import SearchOutcome
 from discover.study.declared_model import StudyModel
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
@@ -87,13 +87,15 @@ def exact_twins(
         beyond = [name for name in twin.law.coefficients if parse_term(name) not in searched]
         rival = _rival_of(twin, beyond if searched else [])
         predictions = _simulate(rival.law, model, [*seen, *unseen], names)
-        judged = judge_rival(rival, reference, predictions, seen, unseen)
+        judged = with_differences(rival, reference, predictions, seen, unseen)
         if judged is not None and (judged.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
             found.setdefault(frozenset(twin.law.coefficients), judged)
     return list(found.values())
 
 
-def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> list[Rival]:
+def other_possible_laws(
+    found: SearchOutcome, flows: Sequence[Flow], runs: Mapping[str, Run]
+) -> list[Rival]:
     """Return the other laws that the posterior holds possible, the likeliest first.
 
     Those whose effects are no sum of library terms are left out. `runs`: as recorded, by name.
@@ -114,7 +116,7 @@ def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, R
         if own is not None and law.coefficients.keys() == LawTerms.of(own).coefficients.keys():
             continue
         reason = f"Its probability given these runs is {percent_of(share)}."
-        rival = judge_rival(Rival(law, reason), told[0], predictions, seen, unseen)
+        rival = with_differences(Rival(law, reason), told[0], predictions, seen, unseen)
         if rival is not None:
             rivals.append(rival)
     return rivals
@@ -147,7 +149,7 @@ def _simulate(
     return simulated(fluid, flows)
 
 
-def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
+def with_differences(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
     """Return a rival with its differences from the law found; None if it cannot be followed."""
     worst: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     separation, place = 0.0, None

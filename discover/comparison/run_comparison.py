@@ -10,8 +10,8 @@ from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import (
     DRAWN,
-    Band,
     Flow,
+    FlowBand,
     comparison_flows,
     prepared,
     require_one_known_law,
@@ -29,7 +29,7 @@ from discover.comparison.hypotheses import (
 )
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, study_library
-from discover.comparison.rivals import Rival, exact_twins, explanations_apart
+from discover.comparison.rivals import Rival, exact_twins, other_possible_laws
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
@@ -37,7 +37,7 @@ from discover.identify import Structure, analyse_structure
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
 from discover.learners.settings import waiting
-from discover.loop.loop import Found, titled
+from discover.loop.loop import SearchOutcome, titled
 from discover.loop.loop_result import LoopResult
 from discover.loop.search_time import ComparisonTime, SearchTime
 from discover.processor import in_one_thread
@@ -187,7 +187,7 @@ def _of_material(
     bands = {}
     for flow in flows:
         middle = column(flow, records[flow.name].predicted[1])
-        bands[flow.key] = Band(middle, middle, middle).claiming(())
+        bands[flow.key] = FlowBand(middle, middle, middle).limited_to(())
     why = f"A {simple.material.title} has no law for it, and it was not measured."
     return Comparison(
         name=study.name, data_summary=data_in_words(data, study),
@@ -213,7 +213,7 @@ def _structure(
 
 
 def _with_what_is_open(
-    comparison: Comparison, found: Found, frame: Frame, data: StudyData, study: Study,
+    comparison: Comparison, found: SearchOutcome, frame: Frame, data: StudyData, study: Study,
     library: TermLibrary,
 ) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
@@ -232,7 +232,7 @@ def _with_what_is_open(
     twins: list[Rival] = []
     if comparison.verdict == "explained":
         twins = exact_twins(terms, frame.model, frame.flows, library)
-    others = explanations_apart(found, drawn, runs)
+    others = other_possible_laws(found, drawn, runs)
     spread = comparison.posterior.spread_of_laws
     statements = make_statements(
         comparison.verdict, frame.flows, bands, structure,

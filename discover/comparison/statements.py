@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discover.comparison.flows import MEASURED, QUANTITIES, Band, Flow, relative_errors
+from discover.comparison.flows import MEASURED, QUANTITIES, Flow, FlowBand, relative_errors
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations import Equation, Tested, combined
 from discover.equations.equation import box_of, flow_numbers
@@ -80,7 +80,7 @@ class Statement:
 
 
 def make_statements(
-    verdict: str, flows: Sequence[Flow], bands: Mapping[str, Band], structure: Structure | None,
+    verdict: str, flows: Sequence[Flow], bands: Mapping[str, FlowBand], structure: Structure | None,
     spread: Mapping[str, float | None], normal_stresses_used: bool = False, terms: int = 0,
 ) -> list[Statement]:  # fmt: skip
     """Return what the training data say of N1 and N2, with the reason.
@@ -125,7 +125,7 @@ def _said_of(quantity, verdict, flows, bands, structure, spread, terms) -> State
     return Statement(quantity, IN_LIBRARY, text)
 
 
-def _widest(quantity: str, flows: Sequence[Flow], bands: Mapping[str, Band]) -> float | None:
+def _widest(quantity: str, flows: Sequence[Flow], bands: Mapping[str, FlowBand]) -> float | None:
     """Return the largest relative half-width in flows that no fit saw; None where one has none."""
     judged = [flow for flow in flows if flow.kind in ("test", "held_out") and flow.in_shear]
     judged = judged or [flow for flow in flows if flow.kind == "training" and flow.in_shear]

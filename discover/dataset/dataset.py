@@ -204,7 +204,7 @@ class Dataset(NotebookView):
         aside = {f"{name} (N1)": why for name, why in never.items()}
         seen: list[Run] = []
         for run in self.runs:
-            records = [run.observing(name) for name in run.beside]
+            records = [run.observing(name) for name in run.also_recorded]
             kept = [one for one in records if one.name not in {*aside, *self.names}]
             seen += [run, *(_from_then_on(record, late.get(run.name)) for record in kept)]
         return replace(self, runs=tuple(seen), set_aside={**self.set_aside, **aside})

@@ -12,7 +12,7 @@ from discover.dataset.mode_search import CLOSELY, ModeFit, ModeSearch, relative_
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.noise_model import independent_samples, rms
-from discover.statistics.noise.whiteness import FEWEST_FAST, separate_probability
+from discover.statistics.noise.whiteness import FEWEST_FAST, independence_probability
 
 MOST_MODES = 30
 # probability that noise leaves such a misfit, up to which it is taken to be none
@@ -201,7 +201,7 @@ def _covariance(
     variance = np.sum(rows**2) / max(rows.size - design.shape[1], 1)
     tested = [[row] for row in rows] + [list(rows)]
     few = rows.shape[1] < FEWEST_FAST  # which do not tell whether it is noise
-    if few or len(tested) * min(map(separate_probability, tested)) <= _SEEMS_NOISE:
+    if few or len(tested) * min(map(independence_probability, tested)) <= _SEEMS_NOISE:
         variance *= rows.size / sum(independent_samples(row) for row in rows)
     return variance * np.linalg.pinv(design.T @ design) * np.outer(amounts, amounts)
 

@@ -214,7 +214,7 @@ class Run(NotebookView):
         return seen
 
     @property
-    def beside(self) -> tuple[RecordedQuantity, ...]:
+    def also_recorded(self) -> tuple[RecordedQuantity, ...]:
         """What was recorded next to σ12: N1, N2, both or neither."""
         both: tuple[RecordedQuantity, ...] = ("N1", "N2") if self.quantity == "sigma12" else ()
         return tuple(one for one in both if getattr(self, COLUMN_OF[one]) is not None)

@@ -127,7 +127,7 @@ def spelled_on_a_page(names: Iterable[str]) -> dict[str, Spelled]:
     for name in dict.fromkeys(names):
         with suppress(InputError):
             found.append(make_effect(name))
-    return spelled_apart(found)
+    return spelled_distinctly(found)
 
 
 Written = Any
@@ -226,7 +226,7 @@ def _value(asked: object, parameter: base.EffectParameter, where: str) -> float 
     return float(asked)
 
 
-def spelled_apart(effects: Iterable[AbstractEffect]) -> dict[str, Spelled]:
+def spelled_distinctly(effects: Iterable[AbstractEffect]) -> dict[str, Spelled]:
     r"""Return equations and letters of effects that stand together, by name of the effect.
 
     A letter that an earlier effect has gets a prime, in an order of names, so that equation and

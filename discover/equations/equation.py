@@ -9,7 +9,7 @@ import pandas as pd
 from jaxtyping import Real
 from numpy.typing import ArrayLike
 
-from discover.effects.registry import Spelled, spelled_apart
+from discover.effects.registry import Spelled, spelled_distinctly
 from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
 from discover.equations.spelling.markup import (
     SEPARATOR,
@@ -180,7 +180,7 @@ class Equation(NotebookView):
     @property
     def spelled_states(self) -> list[Spelled]:
         """Equations and letters of the states, no letter twice, in LaTeX."""
-        spelled = spelled_apart(part.own for part in self.states)
+        spelled = spelled_distinctly(part.own for part in self.states)
         return [spelled[part.effect] for part in self.states]
 
     @property

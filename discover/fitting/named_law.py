@@ -21,7 +21,7 @@ from discover.inference.engine.search import Search
 from discover.laws import LAWS, Fluid, make_law
 from discover.laws.registry import starting_values
 from discover.loop.final_model import augmented_fluid, declared_law
-from discover.loop.from_posterior import Ended
+from discover.loop.from_posterior import FinishedSearch
 from discover.loop.loop import without_fluid
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs, unfitted_runs
 from discover.plain_numbers import as_number, as_whole_number
@@ -145,7 +145,7 @@ def fit(
             "starts. Narrow the ranges with bounds, or give a start."
         )
     posterior = posterior_of(search)
-    ended = Ended(posterior, without_fluid(posterior), most=1)
+    ended = FinishedSearch(posterior, without_fluid(posterior), most=1)
     active = [known.name for known in forward.effects]
     left, n = ended.discrepancy, len(best.free)
     assert best.covariance is not None

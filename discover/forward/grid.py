@@ -258,14 +258,14 @@ def cut(
     return np.append(between.ravel(), times[-1]), pieces * index
 
 
-def had_gone_on(protocol: FlowProtocol) -> bool:
+def was_periodic(protocol: FlowProtocol) -> bool:
     """Return whether a flow at a given rate is an oscillation that had gone on for ever."""
     return protocol.control == "rate" and bool(np.ptp(np.asarray(protocol.cycle)))
 
 
 def _follows_cycle(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> bool:
     end = float(np.asarray(protocol.cycle)[1])
-    return had_gone_on(protocol) and float(times[0]) >= end - 1e-9 * abs(end)
+    return was_periodic(protocol) and float(times[0]) >= end - 1e-9 * abs(end)
 
 
 def _relaxation(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " p"]:

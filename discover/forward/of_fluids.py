@@ -16,7 +16,7 @@ from jaxtyping import Float
 from discover.dataset.run import COLUMN_OF, Run
 from discover.forward.declared import DeclaredModel, Structure
 from discover.forward.flows import Batch, PeriodicFlows, make_batch
-from discover.forward.grid import STRAIN_STEP, had_gone_on
+from discover.forward.grid import STRAIN_STEP, was_periodic
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
 from discover.forward.side_by_side import MadeOnce
@@ -50,7 +50,7 @@ def bare_run(protocol: FlowProtocol, times: Float[np.ndarray, " n"], name: str =
 
 def followed(fluid: Fluid, run: Run) -> Run:
     """Return a run whose cycles are gone through where the fluid has no relaxation of its own."""
-    if fluid.settling_time is not None or not had_gone_on(run.protocol):
+    if fluid.settling_time is not None or not was_periodic(run.protocol):
         return run
     return replace(run, protocol=replace(run.protocol, cycle=np.zeros(2)))
 
@@ -143,7 +143,7 @@ def pieces_in_time(fluid: Fluid, runs: Sequence[Run], strain_step: float, **how:
     return pieces if np.all(np.isfinite(coarse)) else 1
 
 
-def _beside_each_other(*fluids: Fluid) -> tuple[Predictor, Trials]:
+def _side_by_side_predictor(*fluids: Fluid) -> tuple[Predictor, Trials]:
     """Return what predicts fluids, and the vectors that they are to it."""
     laws = [in_shared_form(fluid.law) for fluid in fluids]
     if len({jax.tree.structure(law) for law in laws}) > 1:
@@ -160,7 +160,7 @@ def _beside_each_other(*fluids: Fluid) -> tuple[Predictor, Trials]:
 
 
 # flows of the same fluids are often asked for one after another
-_BESIDE = MadeOnce(_beside_each_other, kept=2)
+_BESIDE = MadeOnce(_side_by_side_predictor, kept=2)
 
 
 def _numbers_of(law: Any) -> Float[np.ndarray, " numbers"]:

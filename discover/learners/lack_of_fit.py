@@ -18,7 +18,7 @@ from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.laws.expansion import LibraryExpansion, in_shared_form
 from discover.learners.files import kept_in_files
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import noise_beside
+from discover.statistics.noise.whiteness import fast_noise
 from discover.words import percent_of
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
@@ -116,7 +116,7 @@ def lack_of_fit(
     misfit = float(np.mean(list(map(rms, by_run))))
     beside = fit.noise.correlation, 1.0 - posterior.unexplained
     if posterior.verdict == "unexplained":
-        size = float(np.mean(noise_beside(by_run, fit.noise.sizes))) if noise is None else noise
+        size = float(np.mean(fast_noise(by_run, fit.noise.sizes))) if noise is None else noise
         return LackOfFit("unexplained", misfit, size, *beside)
     verdict: FitVerdict = "explained" if misfit <= ONLY_NOISE else "no_signal"
     stated_well = noise is not None and misfit <= STATED_TOO_SMALL * noise

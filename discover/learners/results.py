@@ -29,7 +29,7 @@ class RecoveredTerm(LawTerm):
     inner_ci95: Mapping[str, Interval] = field(default_factory=dict, kw_only=True)
 
     @property
-    def is_told_from_zero(self) -> bool:
+    def excludes_zero(self) -> bool:
         """Whether its interval excludes zero."""
         return self.ci95 is not None and not self.ci95[0] <= 0.0 <= self.ci95[1]
 
@@ -136,7 +136,7 @@ def _determined(
         return "no: the law misses the runs by more than noise"
     if against:
         return f"no: {against}"
-    if not term.is_told_from_zero:
+    if not term.excludes_zero:
         return "no: may be zero"
     if any(term.term not in rival for rival in rivals):
         return "no: a law without it fits as well"

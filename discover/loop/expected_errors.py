@@ -138,8 +138,8 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
 
     By their evidence where one of them is all there is. Otherwise all miss the runs, by what each
     run has in common: R misses are draws from one normal distribution of unknown deviation, whose
-    density goes as the misfit to the power −R (see `by_left_out`). What fits σ12 best need not come
-    nearest in N1, so runs count half, and a term without a law keeps its lower prior odds, as does
+    density goes as the misfit to the power −R (see `predictive_mixture`). What fits σ12 best need not
+    come nearest in N1, so runs count half, and a term without a law keeps its lower prior odds, as does
     a function beside a law. Where that stands out and leaves nothing, it is all that counts.
     """
     if posterior.unexplained < 0.5:
@@ -147,7 +147,7 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
     else:
         problem, runs = posterior.problem, len(posterior.problem.fitted.runs)
         beside = [fit for curve in posterior.curves for fit, _ in curve.fits]
-        found = [f for f in (*posterior.search.alive(), *beside) if f.covariance is not None]
+        found = [f for f in (*posterior.search.ranked(), *beside) if f.covariance is not None]
         logs = np.array([
             sum(np.log(problem.odds(name)) for name in fit.names)
             + posterior.has_function(fit) * np.log(TERM_ODDS)
@@ -155,7 +155,7 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
             for fit in found
         ])  # fmt: skip
         weights = np.exp(logs - np.logaddexp.reduce(logs, initial=-np.inf))
-        pairs = posterior.beside_curves(list(zip(found, weights.tolist(), strict=True)))
+        pairs = posterior.mixed_with_curves(list(zip(found, weights.tolist(), strict=True)))
     pairs = sorted(pairs, key=lambda pair: -pair[1])[:_LAWS]
     most = max((p for _, p in pairs), default=0.0)
     pairs = [(f, p) for f, p in pairs if f.covariance is not None and p > _LEAST_LIKELY * most]

@@ -14,7 +14,7 @@ from scipy.special import chdtri
 from discover.answer import Discrepancy
 from discover.dataset import Run
 from discover.effects import AbstractEffect
-from discover.effects.registry import spelled_apart
+from discover.effects.registry import spelled_distinctly
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.identify.twins import oil_twin
 from discover.inference.engine.design import NextTests, design
@@ -40,7 +40,7 @@ from discover.loop.path import Path
 from discover.loop.runs import errors_of, why_untested
 from discover.loop.sentences import EXPLAINED
 from discover.statistics import HALF_BAND
-from discover.statistics.noise.whiteness import noise_beside
+from discover.statistics.noise.whiteness import fast_noise
 from discover.words import percent_of
 
 _DRAWS = 2000
@@ -63,7 +63,7 @@ def _at_ends(
 
 
 @dataclass(frozen=True)
-class Ended(Path):
+class FinishedSearch(Path):
     """What is reported of a posterior: constants, stages, rankings, what is left."""
 
     @cached_property
@@ -204,7 +204,9 @@ class Ended(Path):
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
         search, found = self.posterior.search, []
-        spelled = spelled_apart(self.posterior.problem.effects[name] for name in self.fit.names)
+        spelled = spelled_distinctly(
+            self.posterior.problem.effects[name] for name in self.fit.names
+        )
         for i, (before, after) in enumerate(zip(self.path[:-1], self.path[1:], strict=True), 1):
             (name,) = set(after.names) - set(before.names)
             effect, model = self.posterior.problem.effects[name], self.posterior.problem.model
@@ -289,7 +291,7 @@ class Ended(Path):
             "description": said + self._in_words(),
             "step_instants": {}
             if not problem.declared.step_instants
-            else instants_found(problem.model, self.theta_ahead(fit), instants, rows.runs, held),
+            else instants_found(problem.model, self.held_out_theta(fit), instants, rows.runs, held),
             **self._loadings(),
         }
 
@@ -314,7 +316,7 @@ class Ended(Path):
         sizes = self.fit.noise.sizes
         if self.verdict in ("unexplained", "no_signal"):
             left = [r.relative_residual[-1] for r in self.records if not r.held_out]
-            sizes = noise_beside(left, sizes)
+            sizes = fast_noise(left, sizes)
         return float(np.mean(sizes))
 
     def _in_words(self) -> str:
@@ -375,7 +377,7 @@ class Ended(Path):
 
 
 def result_of(
-    ended: Ended,
+    ended: FinishedSearch,
     laws: tuple[LawFit, ...],
     spikes: Mapping[str, Sequence[float]],
     of_rates: str,

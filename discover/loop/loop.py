@@ -20,12 +20,12 @@ from discover.inference.engine.free_form import FreeForm
 from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.search import Search
-from discover.loop.from_posterior import Ended, result_of
+from discover.loop.from_posterior import FinishedSearch, result_of
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Fold
 from discover.loop.preference import with_function_first, with_named_law_first
 from discover.loop.search_time import SearchTime
-from discover.loop.simple import simple_result
+from discover.loop.simple import simple_material_result
 from discover.loop.task import Task
 from discover.processor import in_one_thread
 from discover.progress import Progress, by_time
@@ -173,7 +173,7 @@ def run_loop_on_each(
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchOutcome:
     """What a search found in runs, before it is reported.
 
     `task`: what was searched. `posterior`: over the hypotheses that were fitted. `tried`: the
@@ -191,10 +191,10 @@ class Found:
 
         None for records that noise and instrument errors alone explain, as of a dead sensor.
         """
-        found = simple_result(self.task, self.posterior)
+        found = simple_material_result(self.task, self.posterior)
         return None if found is None or without_fluid(self.posterior) else found
 
-    def with_curves(self) -> "Found":
+    def with_curves(self) -> "SearchOutcome":
         """Return what was found with free functions of one variable among the hypotheses."""
         self.task.say("curves of one variable")
         posterior = self.posterior
@@ -202,7 +202,7 @@ class Found:
         if curves and curves[0].log_odds > 0.0:
             # the law beside it may be one that the search passed over, and what it is have a name
             search = posterior.search.copied()
-            if search.is_better_beside(curves[0].fits[0][0]):
+            if search.improves_with_another_effect(curves[0].fits[0][0]):
                 posterior = posterior_of(search, posterior)
                 curves = free_functions(posterior)
         if not curves:
@@ -215,14 +215,14 @@ class Found:
         first = with_function_first(self.posterior)
         return first if first is not self.posterior else with_named_law_first(first)
 
-    def ended(self, explanations: int = MOST_LISTED) -> Ended:
+    def ended(self, explanations: int = MOST_LISTED) -> FinishedSearch:
         """Return what is reported of the posterior, with so many explanations at most."""
         posterior = self._reported
-        ahead = [one.form for one in posterior.curves if one.fits is posterior.by_left_out]
+        ahead = [one.form for one in posterior.curves if one.fits is posterior.predictive_mixture]
         curves = [
             replace(form, in_answer=any(form is one for one in ahead)) for form in self.curves
         ]
-        return Ended(posterior, without_fluid(posterior), explanations, curves)
+        return FinishedSearch(posterior, without_fluid(posterior), explanations, curves)
 
     def result(self, explanations: int = MOST_LISTED) -> LoopResult:
         """Return the result of a closed loop."""
@@ -231,13 +231,13 @@ class Found:
         return result_of(ended, lines, task.spikes, task.of_rates, task.unfitted)
 
 
-def search(task: Task, laws: Sequence[str] = ()) -> Found:
+def search(task: Task, laws: Sequence[str] = ()) -> SearchOutcome:
     """Search, with the likeliest of some laws in place of the declared one.
 
     Raises InputError as `Task.choose` and `Task.explained`.
     """
     declared, tried = task.choose(laws)
-    return Found(task, task.explained(declared), tried)
+    return SearchOutcome(task, task.explained(declared), tried)
 
 
 def without_fluid(posterior: Posterior) -> bool:
@@ -247,7 +247,7 @@ def without_fluid(posterior: Posterior) -> bool:
     wrong.
     """
     search, problem = posterior.search, posterior.problem
-    alive = search.alive()
+    alive = search.ranked()
     if not alive:
         return False
     off = copy(problem)

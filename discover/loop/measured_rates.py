@@ -21,7 +21,7 @@ from discover.inference.engine.problem import Problem
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of, steps_between_samples
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import separate_probability
+from discover.statistics.noise.whiteness import independence_probability
 from discover.words import percent_of
 
 _LEAST = 5e-3  # Scatter over the size of the rate, below which the stress hardly tells it from none
@@ -52,12 +52,12 @@ def smoothed(run: Run) -> Run:
     found = np.linalg.lstsq(curves(times), rates, rcond=None)[0]
     smooth = curves(times) @ found
     scatter = rates - smooth
-    if rms(scatter) < _LEAST * rms(rates) or separate_probability([scatter]) < _SEEMS_NOISE:
+    if rms(scatter) < _LEAST * rms(rates) or independence_probability([scatter]) < _SEEMS_NOISE:
         return run
     return replace(run, protocol=sampled_rate(times, smooth), rate=curves(run.time) @ found)
 
 
-def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
+def rate_reading_noise(declared: DeclaredModel, runs: Sequence[Run]) -> str:
     """Return that rates scatter and the stress does not follow; empty where it may.
 
     Every simple term of the library is fitted at either rate: a law too flexible to be believed
@@ -94,7 +94,7 @@ def with_rate_steps(run: Run) -> Run:
     return replace(run, rate_steps=steps_between_samples(run.protocol, run.time, run.rate))
 
 
-def with_places(
+def with_step_instants(
     declared: DeclaredModel, fitted: Sequence[Run], held_out: Sequence[Run]
 ) -> tuple[DeclaredModel, list[Run], list[Run]]:
     """Return the declared model and the runs with a place for the instant of each fitted step.

@@ -66,7 +66,7 @@ class Path:
     @cached_property
     def fit(self) -> Fit:
         """The likeliest hypothesis, fitted to the fitted runs."""
-        told, best = self.posterior.explanations, self.posterior.by_left_out
+        told, best = self.posterior.explanations, self.posterior.predictive_mixture
         if self.without_fluid or not told:
             return self.fitted(())
         # where none of them is all there is, the one that predicts best
@@ -84,8 +84,8 @@ class Path:
         They may have been asked for by the runs held out, or by those left out in turn, to which
         hypotheses are alike that differ by an effect of no size.
         """
-        if fit.at_an_end or self.verdict != "unexplained":
-            return fit.at_an_end
+        if fit.vanished or self.verdict != "unexplained":
+            return fit.vanished
         gained = {}
         for name in fit.names:
             without = self.fitted(set(fit.names) - {name})
@@ -125,7 +125,7 @@ class Path:
         found = whole.found.get(frozenset(self.fit.names))
         return None if found is None else found.theta
 
-    def theta_ahead(self, fit: Fit) -> Float[np.ndarray, " p"]:
+    def held_out_theta(self, fit: Fit) -> Float[np.ndarray, " p"]:
         """Return the constants for runs that no fit saw, which tell their own instants of steps."""
         theta, own = fit.theta.copy(), self._own_instants
         if own is not None:
@@ -138,7 +138,7 @@ class Path:
 
     def predicted(self, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
         """Return what a hypothesis predicts of runs, held out or fitted."""
-        theta = self.theta_ahead(fit) if held_out else fit.theta
+        theta = self.held_out_theta(fit) if held_out else fit.theta
         fitter = self.posterior.fitter_of(fit)
         return predicted(fitter, replace(fit, theta=theta), rows)
 

@@ -45,7 +45,7 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     few = len(posterior.problem.fitted.runs) < FEWEST_RUNS
     if posterior.verdict != "unexplained" or posterior.left is None or few:
         return posterior
-    known = posterior.by_left_out or ((posterior.left.fit, 1.0),)
+    known = posterior.predictive_mixture or ((posterior.left.fit, 1.0),)
     of_the_field = law_of, is_thixotropic_maxwell
     if any(has_name(posterior, known[0][0]) for has_name in of_the_field):
         return posterior
@@ -56,7 +56,7 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     some = sorted(given_up, key=lambda fit: -fit.log_posterior)
     laws = islice((fit for fit in some if law_of(posterior, fit)), _MOST)
     search.add([search.fitter.start(fit.names, fit.theta, fit.linear) for fit in laws])
-    alive = posterior.search.alive()
+    alive = posterior.search.ranked()
     classical, thixotropic = (
         list(islice((fit for fit in alive if has_name(posterior, fit)), _MOST))
         for has_name in of_the_field
@@ -80,7 +80,7 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     return replace(
         posterior,
         left=DiscrepancyModel(fitter, chosen, smallest(posterior.search, chosen)),
-        by_left_out=tuple((some[i], float(weights[i])) for i in order),
+        predictive_mixture=tuple((some[i], float(weights[i])) for i in order),
     )
 
 
@@ -93,7 +93,7 @@ def with_function_first(posterior: Posterior) -> Posterior:
     curve = next(ahead, None)
     if posterior.verdict != "unexplained" or curve is None or not curve.fits[0][0].names:
         return posterior
-    return replace(posterior, left=curve.left, by_left_out=curve.fits)
+    return replace(posterior, left=curve.left, predictive_mixture=curve.fits)
 
 
 def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:

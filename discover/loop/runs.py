@@ -18,7 +18,7 @@ from discover.protocols import strains
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
 from discover.statistics.noise.noise_model import independent_samples, rms
-from discover.statistics.noise.whiteness import fast_part
+from discover.statistics.noise.whiteness import sample_to_sample_noise
 from discover.words import counted
 
 FEWEST_SAMPLES = 5
@@ -78,7 +78,7 @@ def split_runs(
 def unfitted_runs(dataset: Dataset, runs: Sequence[Run]) -> list[Run]:
     """Return N1 and N2 that runs recorded besides, without samples that no fluid can have."""
     sound = {run.name: run.time for run in dataset.quantity_by_quantity()}
-    found = [run.observing(quantity) for run in runs for quantity in run.beside]
+    found = [run.observing(quantity) for run in runs for quantity in run.also_recorded]
     found = [one for one in found if one.name in sound.keys() - {run.name for run in runs}]
     kept = [(one, np.isin(one.time, sound[one.name])) for one in found]
     return [one.window(at) for one, at in kept if np.count_nonzero(at) >= FEWEST_SAMPLES]
@@ -128,7 +128,7 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
 def _needed(run: Run, most: int) -> int:
     """Return how many samples of a run resolve its stress to `_RESOLVED`."""
     size = rms(run.recorded)
-    noise = fast_part(run.recorded) / size if size > 0.0 else 0.0
+    noise = sample_to_sample_noise(run.recorded) / size if size > 0.0 else 0.0
     return int(min(most, max(_FEWEST_KEPT, (noise / _RESOLVED) ** 2)))
 
 
@@ -207,7 +207,7 @@ class RunRecord:
     @property
     def scatter(self) -> float:
         """Deviation of what changes from sample to sample, at most that about the mean."""
-        return min(fast_part(self.measured), float(np.std(self.measured)))
+        return min(sample_to_sample_noise(self.measured), float(np.std(self.measured)))
 
     @property
     def mean_below(self) -> float:

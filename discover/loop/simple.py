@@ -14,7 +14,7 @@ from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
-from discover.statistics.noise.whiteness import fast_part
+from discover.statistics.noise.whiteness import sample_to_sample_noise
 from discover.words import significant
 
 # Effect that is all that such a material has; another law stands for itself
@@ -22,7 +22,7 @@ _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
 _AS_WELL = 1.1
 
 
-def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
+def simple_material_result(task: Task, posterior: Posterior) -> LoopResult | None:
     """Return the result for runs of a simple material; None where a law that relaxes is needed.
 
     None as well where the declared law has this viscosity.
@@ -45,7 +45,7 @@ def simple_result(task: Task, posterior: Posterior) -> LoopResult | None:
     explained = probability >= 0.5
     left = [record.relative_residual[1] for record in records if not record.held_out]
     # where it is all there is, what it leaves is the noise
-    fast = [fast_part(one) for one in left if len(one) > 2]
+    fast = [sample_to_sample_noise(one) for one in left if len(one) > 2]
     noise = material.error if explained or not fast else float(np.mean(fast))
     parameters = {
         one.name: StageParameter(one.value, one.ci95 or (one.value, one.value), one.unit)

@@ -22,11 +22,11 @@ from discover.forward import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem
 from discover.inference.engine.fits import Fitter
-from discover.inference.engine.posterior import by_all_runs, near_the_likeliest, posterior_of
+from discover.inference.engine.posterior import occams_window, posterior_of, refitted_to_all_runs
 from discover.inference.engine.search import Search, with_one_constant, without_by_mode
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
-from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places
+from discover.loop.measured_rates import rate_reading_noise, smoothed, with_step_instants
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
 from discover.loop.runs import MOST_SAMPLES, errors_of, require_samples, split_runs, unfitted_runs
@@ -95,11 +95,11 @@ class Task:
         fitted, held, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
         for some in (fitted, held):
             require_loadings(some, loading)
-        declared, every, _ = with_places(declared, [*fitted, *held], [])
+        declared, every, _ = with_step_instants(declared, [*fitted, *held], [])
         fitted, held = every[: len(fitted)], every[len(fitted) :]
         require_samples(fitted, declared)
         candidates = further_candidates(declared, effects, [*fitted, *held])
-        of_rates = unfelt_scatter(declared, fitted)
+        of_rates = rate_reading_noise(declared, fitted)
         if of_rates:
             fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
         return cls(
@@ -142,7 +142,7 @@ class Task:
         if before is None:
             return Search(fitter, self.most, self.say).run()
         search = Search(fitter, self.most, self.say, without_by_mode(before, fitter)).run()
-        likely = near_the_likeliest(before)
+        likely = occams_window(before)
         # what the search passes over, for many constants by mode are many to fit from nothing
         search.add(
             fitter.start(fit.names, with_one_constant(fit, before.problem, problem), fit.linear)
@@ -165,7 +165,7 @@ class Task:
         names, whole = (), posterior.memory["whole"][0]
         if not declared.by_mode:
             # also what is less likely with one constant for all: that may be why
-            some = [*near_the_likeliest(whole), *near_the_likeliest(first)]
+            some = [*occams_window(whole), *occams_window(first)]
             found = dict.fromkeys(name for fit in some for name in fit.names)
             names = tuple(n for n in found if may_differ_by_mode(first.problem.effects[n]))
             if not names:
@@ -173,7 +173,7 @@ class Task:
         self.say("constants that may differ from mode to mode")
         second = self.searched(replace(declared, by_mode=names), first)
         # by all runs, as the verdict is: those held out may be the ones that tell
-        of_all = by_all_runs(second)
+        of_all = refitted_to_all_runs(second)
         gain = 2.0 * (log_evidence(of_all) - log_evidence(whole))
         if gain > 0.0:
             posterior = posterior_of(second, whole=of_all)
@@ -209,7 +209,7 @@ class Task:
         total, lines = float(np.logaddexp.reduce(list(logs.values()))), []
         for name in sorted(found, key=lambda name: -logs[name]):
             search = found[name]
-            alive = search.alive()
+            alive = search.ranked()
             if not alive:
                 lines.append(LawFit(name, starting_values(name)))
                 continue
@@ -229,7 +229,7 @@ class Task:
 
 def log_evidence(search: Search) -> float:
     """Return the log of evidence times prior of all hypotheses of a search together."""
-    alive = search.alive()
+    alive = search.ranked()
     return float(np.logaddexp.reduce([search.rank(fit) for fit in alive])) if alive else -np.inf
 
 

@@ -68,7 +68,7 @@ def _line(run: Run, *, is_table: bool = False) -> dict[str, Any]:
         "along": along,
         "rate": rate,
         "recorded": _ends(values, unit),
-        "beside": ", ".join(run.beside) or "–",
+        "beside": ", ".join(run.also_recorded) or "–",
     }
 
 

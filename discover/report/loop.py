@@ -29,7 +29,7 @@ from discover.report.plots.loop.runs import (
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import fast_part
+from discover.statistics.noise.whiteness import sample_to_sample_noise
 from discover.study.run_folder import RunFolder
 from discover.words import effect_title, listed, significant
 
@@ -251,7 +251,7 @@ def noise_range(result: LoopResult) -> list[float] | None:
     the part of them that changes from sample to sample.
     """
     residuals = [r.relative_residual[-1] for r in result.records if not r.held_out]
-    for of_run in (rms, fast_part):
+    for of_run in (rms, sample_to_sample_noise):
         noise = [of_run(values) for values in residuals]
         if noise and np.isclose(np.mean(noise), result.noise_floor, rtol=1e-3):
             return noise

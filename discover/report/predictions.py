@@ -100,7 +100,7 @@ def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[
     if who == POSTERIOR:
         band = comparison.bands.get(flow.key)
     elif who == "tensor_sindy" and comparison.determined_terms and flow.kind != "training":
-        band = comparison.claimed(flow)
+        band = comparison.determined_band(flow)
     else:
         band = None
     if band is None:

@@ -10,7 +10,7 @@ from discover.dataset.run import Run
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.forward.flows import make_batch
-from discover.forward.grid import MAX_GRID_POINTS, STRAIN_STEP, had_gone_on
+from discover.forward.grid import MAX_GRID_POINTS, STRAIN_STEP, was_periodic
 from discover.forward.of_fluids import (
     bare_run,
     components,
@@ -101,7 +101,7 @@ def simulate(
     if float(times[-1]) == float(protocol.begins):
         return ShearStress(times, viscous)
     run = followed(fluid, bare_run(protocol, times))
-    is_periodic = had_gone_on(run.protocol)
+    is_periodic = was_periodic(run.protocol)
     if protocol.control == "steady":
         found = components([fluid], make_batch([run]))[0, 0]
     else:

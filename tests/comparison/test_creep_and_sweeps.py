@@ -12,7 +12,7 @@ from discover.comparison.known_part import without_instrument
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
-from discover.loop.from_posterior import Ended
+from discover.loop.from_posterior import FinishedSearch
 from discover.protocols import imposed_stress, oscillations, steady_rates
 from discover.report.predictions import comparison_predictions
 from discover.study.data import StudyData
@@ -204,6 +204,6 @@ def test_a_flow_curve_alone_gives_a_law_and_leaves_its_second_normal_stress_open
 def test_an_instrument_is_not_taken_out_of_creep():
     data = dc.Dataset("planted", (creep(GIESEKUS, 40.0),))
     effects = known_effects({"stress_gain": {"gain_error": 0.1}})
-    divided, ended = StudyData(data, data, data.select([])), object.__new__(Ended)
+    divided, ended = StudyData(data, data, data.select([])), object.__new__(FinishedSearch)
     with pytest.raises(InputError, match=r"takes effects of an instrument \(stress_gain\)"):
         without_instrument(divided, ended, effects, np.zeros(1))

@@ -19,7 +19,7 @@ from discover.comparison.flows import (
     true_terms,
     without_spikes_in_fit,
 )
-from discover.comparison.learning import at_once
+from discover.comparison.learning import run_concurrently
 from discover.comparison.outcome import place
 from discover.comparison.run_comparison import data_in_words
 from discover.dataset import Dataset, Run
@@ -78,7 +78,7 @@ def test_when_one_part_fails_the_others_end_where_they_say_or_ask_something(says
             raise
 
     with pytest.raises(ValueError, match="no law"):
-        at_once({"goes on": goes_on, "fails": fails}, silent)
+        run_concurrently({"goes on": goes_on, "fails": fails}, silent)
     assert ended == [True]
 
 
@@ -92,7 +92,7 @@ def test_an_interrupt_of_the_caller_ends_all_parts():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        at_once({"one": goes_on, "other": goes_on}, interrupted)
+        run_concurrently({"one": goes_on, "other": goes_on}, interrupted)
 
 
 TIME = np.linspace(0.0, 20.0, 201)
@@ -198,7 +198,7 @@ def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, opt
     monkeypatch.setattr("discover.comparison.learning.train", given)
     # what else could explain the runs is not looked for: it changes no run
     monkeypatch.setattr("discover.comparison.hypotheses.MOST_EFFECTS", 0)
-    monkeypatch.setattr("discover.loop.loop.simple_result", lambda *_: None)
+    monkeypatch.setattr("discover.loop.loop.simple_material_result", lambda *_: None)
     compared = {"learners": ["tensor_sindy"], "high_deborah": [1.5], **options}
     study = parse_study({"data": {"folder": "waves"}, "compare": compared})
     data = oscillations(2001)

@@ -168,7 +168,7 @@ def test_both_learners_see_records_without_the_gain_and_resume_the_same(weak, wi
     known = compared(weak, effects={"stress_gain": {"gain_error": -0.1}})
     for found in (with_gain, known):
         for name in ("tensor_sindy", "tbnn_ude"):
-            for flow in [*found.flows_of("training"), *found.judged]:
+            for flow in [*found.flows_of("training"), *found.unseen_flows]:
                 # the noise, and a gain that is known to a fraction of it
                 assert found.errors(name, flow)["sigma12"] == pytest.approx(0.01, rel=0.35)
     again = compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
@@ -178,7 +178,7 @@ def test_both_learners_see_records_without_the_gain_and_resume_the_same(weak, wi
 @pytest.mark.slow
 def test_without_the_gain_the_same_law_misses_by_it_and_python_takes_what_a_study_does(weak):
     found = compared(weak)
-    (flow,) = found.judged
+    (flow,) = found.unseen_flows
     before = found.errors("before", flow)["sigma12"]
     assert before > 0.09  # the gain is 10 %
     # the learner is given records without it

@@ -18,7 +18,7 @@ from discover.comparison.hypotheses import terms_of
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.inference.engine.fit import Fit
-from discover.loop.loop import Found
+from discover.loop.loop import SearchOutcome
 from discover.loop.loop_result import LoopResult
 from discover.study import read_study
 from discover.study.declared_model import declared_model, forward_model
@@ -97,7 +97,7 @@ def test_the_gain_is_found_beside_classical_laws_the_right_one_best_and_normal_s
 
 
 def test_the_band_of_n1_holds_the_truth_and_both_readings_of_a_tenth(found, records):
-    (flow,) = found.judged
+    (flow,) = found.unseen_flows
     band, truth = found.bands[flow.key], records["held.csv"].N1
     # 95 % of the samples should lie inside, and those of one run err together
     assert np.mean((band.low["N1"] <= truth) & (truth <= band.high["N1"])) > 0.9
@@ -208,7 +208,7 @@ def test_two_effects_with_a_term_in_common_are_one_law():
     theta = np.array([0.2, 0.1])
     positions = {"ptt_linear": [0], "tr(sigma)*sigma": [1]}
     problem = SimpleNamespace(effects=effects, model=SimpleNamespace(positions=positions.get))
-    found = Mock(Found, posterior=SimpleNamespace(problem=problem))
+    found = Mock(SearchOutcome, posterior=SimpleNamespace(problem=problem))
     (term,) = terms_of(Mock(Fit, names=tuple(effects), theta=theta), found)
     # ε tr(σ) σ of linear PTT, Phan-Thien & Tanner 1977
     assert (term.term, term.coefficient) == ("tr(sigma)*sigma", pytest.approx(0.3))

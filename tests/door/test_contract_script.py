@@ -95,7 +95,7 @@ def test_progress_has_one_shape_for_learners_and_loop(after):
 def test_the_comparison_judges_on_what_no_fit_saw(after):
     comparison = after["comparison"]
     assert list(comparison.outcomes) == ["tensor_sindy", "tbnn_ude"]
-    assert [flow.name for flow in comparison.judged] == ["fast.csv"]
+    assert [flow.name for flow in comparison.unseen_flows] == ["fast.csv"]
     errors = comparison.errors_table().loc[("fast.csv", "sigma12")]
     assert errors["tensor_sindy"] < 0.02 < errors["before"]
     assert errors["tensor_sindy"] == pytest.approx(1.0 - after["sindy"].score(after["test"]), 0.01)

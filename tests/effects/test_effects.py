@@ -27,7 +27,7 @@ from discover.effects import (
     named_effects,
 )
 from discover.effects.kinematic import first_order_lag
-from discover.effects.registry import spelled_apart
+from discover.effects.registry import spelled_distinctly
 from discover.equations import Equation
 from discover.equations.files import equation_latex
 from discover.equations.parts import StatePart
@@ -301,7 +301,7 @@ def test_letters_of_effects_are_their_own_whatever_their_order_and_none_of_every
         assert not letters(effect) & RESERVED, effect.name
     clashes = 0
     for pair in combinations(named_effects().values(), 2):
-        spelled = spelled_apart(pair)
+        spelled = spelled_distinctly(pair)
         own = [*spelled[pair[0].name].symbols.values(), *spelled[pair[1].name].symbols.values()]
         own += [state for one in spelled.values() for state in one.states]
         assert len(set(own)) == len(own), [one.name for one in pair]
@@ -309,12 +309,14 @@ def test_letters_of_effects_are_their_own_whatever_their_order_and_none_of_every
     assert clashes  # without any there would be nothing to spell apart
     # a table lists effects as they were added, an equation as they act
     for pair in combinations(named_effects().values(), 2):
-        assert spelled_apart(pair) == spelled_apart(pair[::-1]), [one.name for one in pair]
+        assert spelled_distinctly(pair) == spelled_distinctly(pair[::-1]), [
+            one.name for one in pair
+        ]
 
 
 def test_an_equation_has_the_letters_of_its_table_and_an_exported_law_each_once():
     pair = map(make_effect, ("thixotropy", "thixotropic_relaxation"))
-    first, second = spelled_apart(pair).values()
+    first, second = spelled_distinctly(pair).values()
     assert first.equation == make_effect("thixotropic_relaxation").equation
     for letter in second.symbols.values():
         assert letter.removeprefix("1/") in second.equation

@@ -4,7 +4,7 @@ import numpy as np
 
 from discover.dataset import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.loop.measured_rates import with_places, with_rate_steps
+from discover.loop.measured_rates import with_rate_steps, with_step_instants
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 
 MODULI, TIMES = np.array([50.0, 120.0, 30.0, 10.0]), np.array([3.0, 0.5, 0.05, 0.01])
@@ -31,7 +31,7 @@ def test_a_rate_that_steps_between_samples_still_steps_there():
         for level in (3.0, 0.5)
         for rate in [np.where(time < 1.52, 1.0, level)]
     )
-    declared, [run, *others], _ = with_places(
+    declared, [run, *others], _ = with_step_instants(
         DECLARED, [with_rate_steps(one) for one in (run, *others)], []
     )
     assert run.rate_steps

@@ -15,7 +15,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine import Problem
 from discover.inference.engine.design import design
 from discover.inference.engine.free_functions import free_functions
-from discover.inference.engine.posterior import _unlike_noise
+from discover.inference.engine.posterior import _log_odds_of_smooth_misfit
 from discover.loop.runs import split_runs
 from discover.loop.task import candidates_of
 
@@ -239,5 +239,7 @@ def test_what_all_runs_leave_alike_is_no_noise_and_what_each_leaves_is(tmp_path,
     assert own.verdict == "effects_added"
     assert own.explanations[0].members[0] == ("giesekus_mobility",)
     # and so says the test that knows no curve; its log odds are even at 0
-    shape, noise = (_unlike_noise(one.search.fitter, one.fits[0][0]) for one in (alike, own))
+    shape, noise = (
+        _log_odds_of_smooth_misfit(one.search.fitter, one.fits[0][0]) for one in (alike, own)
+    )
     assert shape > 0.0 > noise

@@ -156,7 +156,7 @@ def test_what_fits_alike_is_decided_by_evidence_and_not_by_a_function_that_bends
     trained = train_default(noisy, jax.random.key(0), True, RECIPE)
     assert trained.others
     laws = [trained.law, trained.others[0].law]
-    values = evidence.surprises(laws, noisy)
+    values = evidence.negative_log_evidence(laws, noisy)
     assert values[0] <= values[1]
     true = FLUID.respond(flow_at(2.0), TIMES).N1
     # σ12 leaves N1 open, so no small error is asked for: only the smaller one of the two
@@ -166,7 +166,7 @@ def test_what_fits_alike_is_decided_by_evidence_and_not_by_a_function_that_bends
 
 def test_a_law_that_leaves_more_than_noise_is_less_likely(own, law):
     worse = eqx.tree_at(lambda tree: tree.constants, law, law.constants.at[3].add(0.3))
-    values = evidence.surprises([worse, law], own)[::-1]
+    values = evidence.negative_log_evidence([worse, law], own)[::-1]
     assert values[1] > values[0] + 100.0
 
 
@@ -179,7 +179,7 @@ def test_of_laws_that_leave_the_same_the_one_that_was_told_less_is_likelier(own,
     told = eqx.tree_at(
         lambda tree: tree.network.layers[0].weight, idle, 5.0 * idle.network.layers[0].weight
     )
-    values = evidence.surprises([told, idle], own)
+    values = evidence.negative_log_evidence([told, idle], own)
     assert values[0] > values[1]
 
 
@@ -191,11 +191,11 @@ def test_a_law_that_runs_away_at_twice_the_rate_is_taken_only_for_want_of_anothe
         law,
         (jnp.zeros(8).at[3].set(-0.05), jnp.zeros(8)),
     )
-    assert evidence.endures(law, evidence.at_twice_the_rate(own))
+    assert evidence.stable_at_double_rate(law, evidence.at_twice_the_rate(own))
     assert np.all(np.isfinite(trajectories(wild, own).states))
-    assert not evidence.endures(wild, evidence.at_twice_the_rate(own))
-    assert np.isfinite(evidence.surprises([law, wild], own)).tolist() == [True, False]
-    assert np.isfinite(evidence.surprises([wild], own)[0])
+    assert not evidence.stable_at_double_rate(wild, evidence.at_twice_the_rate(own))
+    assert np.isfinite(evidence.negative_log_evidence([law, wild], own)).tolist() == [True, False]
+    assert np.isfinite(evidence.negative_log_evidence([wild], own)[0])
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from discover.loop.answering import _constants, shows_a_derivative
 from discover.loop.by_quantity import beyond_noise, errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread, steady_shear
 from discover.loop.fitted_range import described, range_of
-from discover.loop.from_posterior import Ended
+from discover.loop.from_posterior import FinishedSearch
 from discover.loop.parts import ErrorPair, Stage, StageParameter
 from discover.loop.runs import RunRecord
 from discover.loop.sentences import what_to_measure_next
@@ -83,7 +83,7 @@ def ended(verdict, known=None):
     found = SimpleNamespace(
         posterior=posterior, fit=fit, verdict=verdict, records=[run], without_fluid=False
     )
-    found.noise = Ended.noise.fget(found)
+    found.noise = FinishedSearch.noise.fget(found)
     return found
 
 

@@ -255,7 +255,7 @@ def test_a_search_with_constants_by_mode_fits_nothing_again_that_has_none(monkey
     assert {mobility in start.names for start in fitted} == {True}
     assert {*second.found} == {*first.found}
     # each mode has a constant of its own here
-    assert second.alive()[0].log_evidence > first.alive()[0].log_evidence + 100.0
+    assert second.ranked()[0].log_evidence > first.ranked()[0].log_evidence + 100.0
 
 
 def test_a_law_that_needs_constants_by_mode_is_weighed_with_them_by_all_runs():

@@ -283,7 +283,7 @@ SIZES = {LAW: 1, BENCH: 1, TWIN: 2}  # constants of each effect
 def test_effects_are_reported_that_the_fitted_runs_show(verdict, likelihoods, kept):
     found = {
         frozenset(names): SimpleNamespace(
-            names=tuple(sorted(names)), log_likelihood=value, at_an_end=()
+            names=tuple(sorted(names)), log_likelihood=value, vanished=()
         )
         for names, value in likelihoods.items()
     }
@@ -291,7 +291,7 @@ def test_effects_are_reported_that_the_fitted_runs_show(verdict, likelihoods, ke
     effects = {n: SimpleNamespace(parameters=range(k)) for n, k in SIZES.items()}
     posterior = SimpleNamespace(
         explanations=[SimpleNamespace(members=[chosen])], verdict=verdict,
-        by_left_out=[(found[frozenset(chosen)], 1.0)], has_function=lambda fit: False,
+        predictive_mixture=[(found[frozenset(chosen)], 1.0)], has_function=lambda fit: False,
         search=SimpleNamespace(found=found), problem=SimpleNamespace(effects=effects),
     )  # fmt: skip
     assert Path(posterior, False, (), 1).fit.names == kept

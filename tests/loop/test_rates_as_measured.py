@@ -19,7 +19,12 @@ from discover.effects import Record, make_effect, simplest_terms
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.loop import measured_rates, run_loop, run_loop_on_each
-from discover.loop.measured_rates import smoothed, unfelt_scatter, with_places, with_rate_steps
+from discover.loop.measured_rates import (
+    rate_reading_noise,
+    smoothed,
+    with_rate_steps,
+    with_step_instants,
+)
 from discover.protocols import sampled_rate
 from discover.report.loop import loop_verdict
 
@@ -126,9 +131,9 @@ def test_noise_of_the_reading_is_told_from_that_of_the_motor(seed, some, monkeyp
         terms = [term for term in simplest_terms() if term.name in FEW]
         assert len(terms) == len(FEW)
         monkeypatch.setattr(measured_rates, "simplest_terms", lambda: terms)
-    said = unfelt_scatter(DECLARED, runs_of(0.03, False, seed))
+    said = rate_reading_noise(DECLARED, runs_of(0.03, False, seed))
     assert "scatter by 3" in said or "scatter by 2" in said
-    assert unfelt_scatter(DECLARED, runs_of(0.03, True, seed)) == ""
+    assert rate_reading_noise(DECLARED, runs_of(0.03, True, seed)) == ""
 
 
 def test_the_rate_in_the_midst_is_nearer_than_the_samples():
@@ -146,7 +151,7 @@ def test_a_rate_that_was_commanded_hardly_scatters_or_drifts_stays_as_it_is():
     drifts = dc.Run("drifts", TIMES, sampled_rate(TIMES, drifting), drifting, quiet[1].stress)
     for run in (told, *quiet, drifts):
         assert smoothed(run) is run
-    assert unfelt_scatter(DECLARED, [told, *quiet]) == ""
+    assert rate_reading_noise(DECLARED, [told, *quiet]) == ""
 
 
 # a rate that steps between two samples
@@ -219,11 +224,11 @@ def test_a_fitted_instant_takes_the_runs_own_place_for_all_that_it_recorded():
     flow, normal = dc.measured_rate(TIMES, STEPPED), {"first_normal_stress_difference": stress}
     run = with_rate_steps(dc.Run("a.csv", TIMES, flow, STEPPED, stress, **normal))
     other = replace(run, name="b.csv")
-    declared, fitted, held = with_places(DECLARED, [run, other], [run.observing("N1")])
+    declared, fitted, held = with_step_instants(DECLARED, [run, other], [run.observing("N1")])
     assert declared.step_instants == 2
     assert [one.rate_steps[0].place for one in (*fitted, *held)] == [0, 1, 0]
     run = dc.Run("a.csv", TIMES, dc.measured_rate(TIMES, STEPPED), STEPPED, STEPPED)
-    declared, (run,), _ = with_places(DECLARED, [with_rate_steps(run)], [])
+    declared, (run,), _ = with_step_instants(DECLARED, [with_rate_steps(run)], [])
     model, batch = AugmentedModel(declared, []), make_batch([run])
     theta = model.zero()
     assert model.free_positions == [model.size - 1]

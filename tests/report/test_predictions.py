@@ -8,7 +8,7 @@ import pytest
 
 from discover.comparison import Flow, LearnerOutcome
 from discover.comparison.comparison import Comparison
-from discover.comparison.flows import Band
+from discover.comparison.flows import FlowBand
 from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.report.predictions import (
@@ -88,7 +88,7 @@ def test_bands_stand_where_a_claim_is_made_and_nowhere_else():
     middle, low, high = (
         dict.fromkeys(("sigma12", "N1", "N2"), STRESS + off) for off in (0.0, -0.5, 0.5)
     )
-    band = Band(middle, low, high)
+    band = FlowBand(middle, low, high)
     table = comparison_predictions(comparison(flows, of(flows), {flows[1].key: band}))
     claimed = table.dropna(subset=["low95", "high95"])
     assert set(claimed["role"]) == {"prediction"}

@@ -16,7 +16,7 @@ from fewer_hypotheses import few_candidates
 from standing_alone import SCRIPT, stands_alone
 
 from discover.comparison import compare
-from discover.comparison.flows import Band
+from discover.comparison.flows import FlowBand
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison.report import write_comparison
@@ -140,7 +140,9 @@ def test_every_picture_is_well_formed_named_in_every_curve_and_has_a_text_altern
 
 
 def test_a_picture_is_the_same_bytes_every_time_and_follows_light_and_dark(comparison):
-    first, second = (plots.flow_picture(comparison, comparison.judged[0]).svg for _ in range(2))
+    first, second = (
+        plots.flow_picture(comparison, comparison.unseen_flows[0]).svg for _ in range(2)
+    )
     assert first == second
     drawn = plots.training_picture(comparison)
     text = drawn.adaptive
@@ -152,7 +154,7 @@ def test_a_picture_is_the_same_bytes_every_time_and_follows_light_and_dark(compa
 
 
 def test_a_curve_that_ran_away_is_left_out(comparison):
-    flow = comparison.judged[0]
+    flow = comparison.unseen_flows[0]
     outcome = comparison.outcomes["tbnn_ude"]
     lost = replace(outcome, predictions={**outcome.predictions, flow.key: None})
     without = replace(comparison, outcomes={**comparison.outcomes, "tbnn_ude": lost})
@@ -212,12 +214,12 @@ def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, pa
     # three flows, one learner; σ12 and N1, for N2 is not determined
     assert [s.quantity for s in comparison.statements if s.undetermined] == ["N2"]
     assert table.count("± ") == 6
-    flow = comparison.judged[0]
+    flow = comparison.unseen_flows[0]
     one = np.ones(flow.times.size)
     middle, low, high = (
         dict.fromkeys(("sigma12", "N1", "N2"), factor * one) for factor in (1.0, 0.9, 1.1)
     )
-    banded = replace(comparison, bands={flow.key: Band(middle, low, high)})
+    banded = replace(comparison, bands={flow.key: FlowBand(middle, low, high)})
     widths = [cell["half_width"] for cell in error_rows(banded)[0]["cells"]]
     assert widths[:3] == widths[6:] == [None] * 3  # before, and one network
     assert widths[3:5] == pytest.approx([0.1] * 2)
@@ -246,8 +248,8 @@ def test_a_comparison_shows_itself_as_tables(comparison):
     terms, errors = comparison.terms_table(), comparison.errors_table()
     # to what the integration promises
     assert terms.loc["sigma.sigma"].tolist() == pytest.approx([0.2] * len(terms.columns), rel=1e-4)
-    flow = comparison.judged[0].name
-    wanted = comparison.errors("before", comparison.judged[0])["N1"]
+    flow = comparison.unseen_flows[0].name
+    wanted = comparison.errors("before", comparison.unseen_flows[0])["N1"]
     assert errors.loc[(flow, "N1"), "before"] == wanted
     assert errors.loc[(flow, "N1"), "tensor_sindy"] < wanted
     shown = comparison._repr_html_()

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, without_spikes
 from discover.dataset.run import Run
-from discover.statistics.noise.noise_model import read_times
+from discover.statistics.noise.noise_model import hold_length
 from discover.summary_view import NotebookView
 from discover.words import counted
 
@@ -134,7 +134,7 @@ def _of_samples(run: Run) -> Iterator[Finding]:
         where = ", ".join(f"{t:.6g}" for t in spikes[:4]) + (" …" if len(spikes) > 4 else "")
         count = "one sample" if len(spikes) == 1 else f"{len(spikes)} samples"
         yield found("spikes", run.name, count=count, where=where)
-    if (often := read_times(run.stress)) > 1:
+    if (often := hold_length(run.stress)) > 1:
         yield found("held_values", run.name, times=often)
     if run.time[0] > 0.2 * run.time[-1]:
         yield found("late_start", run.name, first=run.time[0], last=run.time[-1])

@@ -12,7 +12,7 @@ from discover.errors import InputError
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import fast_part
+from discover.statistics.noise.whiteness import sample_to_sample_noise
 
 _SAME = 0.02  # relative difference of rates, and of what runs.csv says of two runs, that is none
 _FEWEST_SAMPLES = 10
@@ -107,7 +107,7 @@ def is_copy(one: Run, other: Run) -> bool:
     if not np.any(known):
         return False
     off = rms(known - found)
-    return off <= _ROUNDED * fast_part(known)
+    return off <= _ROUNDED * sample_to_sample_noise(known)
 
 
 def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:

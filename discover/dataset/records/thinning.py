@@ -9,8 +9,8 @@ from scipy.interpolate import make_lsq_spline
 
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
-from discover.statistics.noise.noise_model import read_times
-from discover.statistics.noise.outliers import isolated
+from discover.statistics.noise.noise_model import hold_length
+from discover.statistics.noise.outliers import isolated_outliers
 
 # a record with more samples is thinned: they cost time and say nothing new about a law
 MOST_SAMPLES = 20_000
@@ -112,7 +112,7 @@ def bends(place: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> np
     return values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2]))
 
 
-def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
+def next_to_a_step(run: Run) -> Bool[np.ndarray, " n"]:
     """Which samples are next to a step or corner of rate or stress, whichever was imposed."""
     imposed = run.stress if run.protocol.control == "stress" else run.rate
     beside = np.zeros(len(imposed), dtype=bool)
@@ -127,7 +127,7 @@ def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
 
 def without_spikes(run: Run) -> tuple[Run, list[float]]:
     """Return a run without samples that stand alone in the record, and their times in s."""
-    off = isolated(run.recorded) & ~beside_a_step(run)
+    off = isolated_outliers(run.recorded) & ~next_to_a_step(run)
     if not np.any(off):
         return run, []
     return run.window(~off), [float(t) for t in run.time[off]]
@@ -135,7 +135,7 @@ def without_spikes(run: Run) -> tuple[Run, list[float]]:
 
 def without_held_values(run: Run) -> Run:
     """Keep the first sample of each value that is held: one read again fits as a lag."""
-    times = read_times(run.recorded)
+    times = hold_length(run.recorded)
     if times == 1:
         return run
     fresh = np.diff(run.recorded, prepend=np.nan) != 0.0

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from discover.effects import ConstitutiveEffect
 from discover.inference.engine.fit import Fit
-from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
+from discover.inference.engine.left_out import MOST_MISSED, next_run_factor
 from discover.inference.engine.noise import deviation
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
@@ -191,7 +191,7 @@ class Predictions:
         fitted, errors = fitter.errors, fitter.errors_of(self.rows)
         variances = np.diag(fit.covariance)[len(fit.priors) :]
         with np.errstate(all="ignore"):  # a law that runs away
-            apart = errors.apart(record[0], fit.linear, variances, fitted)
+            apart = errors.unshared_variance(record[0], fit.linear, variances, fitted)
             nothing = np.zeros((len(self.rows), 0))  # moduli were moved themselves
             found = errors.recorded(record, errors.like(fitted, linear), nothing)
         return found, np.where(errors.places_in(fitted)[self.rows.run] >= 0, 0.0, apart)
@@ -217,7 +217,7 @@ class Predictions:
         if best is not fit:
             own, least = (posterior.fitter_of(one).misfit(one) for one in (fit, best))
             worse = max(own / max(least, 1e-150), 1.0)
-        size = of_the_next_run(len(missed)) * rms(missed) * worse
+        size = next_run_factor(len(missed)) * rms(missed) * worse
         beyond = np.maximum(self.rows.fastest / fastest, 1.0)
         return np.minimum(size * beyond, MOST_MISSED)[self.rows.run]
 

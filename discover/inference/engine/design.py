@@ -38,7 +38,7 @@ from discover.protocols import (
     step_rates,
 )
 from discover.protocols.kinematics import FOLLOWED, RecordedQuantity
-from discover.statistics.noise.noise_model import rms, squared_distance
+from discover.statistics.noise.noise_model import rms, squared_mahalanobis_distance
 
 BEYOND = 3.0
 """How far the slowest and fastest test lie beyond the rates that were fitted."""
@@ -360,7 +360,7 @@ def _expected_of(
             factor = np.concatenate([factors[i], factors[j]])
             if loading:
                 factor = np.vstack([factor, loading * curves[i] / scale])
-            apart = 0.5 * squared_distance((curves[i] - curves[j]) / scale, factor)
+            apart = 0.5 * squared_mahalanobis_distance((curves[i] - curves[j]) / scale, factor)
             evidence[i, j] = evidence[j, i] = min(apart, _MOST_EVIDENCE)
     nats = float(-share @ np.log(np.exp(-0.25 * evidence) @ share))
     samples = test.rate if is_flow_curve else test.time

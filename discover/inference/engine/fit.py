@@ -23,7 +23,7 @@ class Fit:
     the records with respect to the coordinates, then of what is linear, shape (rows, free + q).
     `covariance`, `root`: of these, and a factor of it: root rootᵀ, both of shape (free + q, free +
     q). `log_evidence`: of the records given the hypothesis, by Laplace's method; minus infinity
-    where an effect ends at zero or the law runs away. `at_an_end`: effects whose amplitude ended at
+    where an effect ends at zero or the law runs away. `vanished`: effects whose amplitude ended at
     zero. `without`: a run whose rows the fit does not see; None for none. `shifts`: what errors of
     the moduli do to predictions, in Pa, shape (rows, k). `shifted`: the predictions that these are
     of, shape (rows,).
@@ -42,7 +42,7 @@ class Fit:
     covariance: Float[np.ndarray, "n n"] | None = None
     root: Float[np.ndarray, "n n"] | None = None
     log_evidence: float = -np.inf
-    at_an_end: tuple[str, ...] = ()
+    vanished: tuple[str, ...] = ()
     without: int | None = None
     shifts: Float[np.ndarray, "rows k"] | None = None
     shifted: Float[np.ndarray, " rows"] | None = None

@@ -406,7 +406,7 @@ class Fitter:
             prior = fit.priors[at]
             if prior.low == 0.0 and fit.theta[at] <= 1e-6 * prior.width:
                 ended.append(name)
-        fit.at_an_end = tuple(ended)
+        fit.vanished = tuple(ended)
         n = len(curvature)
         fit.log_evidence = (
             -np.inf if ended else fit.log_posterior + 0.5 * n * LOG_2PI - 0.5 * determinant

@@ -78,7 +78,7 @@ class _Laws:
         fits = [
             fit
             for fit in self.search.found.values()
-            if fit.covariance is not None and not fit.at_an_end
+            if fit.covariance is not None and not fit.vanished
         ]
         fits.sort(key=lambda fit: -fit.log_likelihood)
         sizes = range(_LARGEST_BASE + 1)
@@ -184,7 +184,7 @@ def _weighed(fits: Sequence[Fit], rank_of: Callable[[Fit], float]) -> tuple[tupl
 def _likeliest(search: Search, discrepancies: Sequence[DiscrepancyModel]) -> float:
     """Return the largest log of evidence times prior, with a discrepancy or without."""
     beside = [search.rank(one.fit) + one.log_factor for one in discrepancies]
-    return max(*beside, *(search.rank(fit) for fit in search.alive()[:1]))
+    return max(*beside, *(search.rank(fit) for fit in search.ranked()[:1]))
 
 
 def _starts(

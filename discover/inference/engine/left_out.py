@@ -57,13 +57,13 @@ def _error(fitter: Fitter, part: Fit) -> float:
     rows = fitter.rows
     at = rows.run == part.without
     with np.errstate(over="ignore", invalid="ignore"):  # without the run the law runs away
-        ahead = fitter.errors.as_read(part.predicted, part.linear)
+        ahead = fitter.errors.transducer_reading(part.predicted, part.linear)
         off = (rows.recorded - ahead)[at] / rows.size[at]
         size = float(np.sqrt(np.mean(off**2)))
     return min(size, MOST_MISSED) if np.isfinite(size) else MOST_MISSED
 
 
-def to_first_order(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
+def left_out_to_first_order(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
     """Return `left_out` of one fit, by one step from where it ended: no prediction is asked for."""
     assert fit.jacobian is not None
     assert fit.covariance is not None
@@ -73,7 +73,7 @@ def to_first_order(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
     stiff = np.linalg.inv(fit.covariance)
     # constants and transducers; zero, drift and loading are of each run
     shared = len(fit.priors) + fitter.errors.of_transducers.stop
-    ahead = rows.recorded - fitter.errors.as_read(fit.predicted, fit.linear)
+    ahead = rows.recorded - fitter.errors.transducer_reading(fit.predicted, fit.linear)
     found = []
     for i in range(len(rows.runs)):
         own, at = white[rows.run[fitter.noise.kept] == i], rows.run == i
@@ -84,13 +84,13 @@ def to_first_order(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
     return np.minimum(np.nan_to_num(found, nan=MOST_MISSED), MOST_MISSED)
 
 
-def by_first_order(fitter: Fitter, fits: Sequence[Fit]) -> list[Fit]:
+def screened_to_first_order(fitter: Fitter, fits: Sequence[Fit]) -> list[Fit]:
     """Return the hypotheses that predict runs left out best to first order, the best first."""
-    rough = [float(np.sum(to_first_order(fitter, fit) ** 2)) for fit in fits]
+    rough = [float(np.sum(left_out_to_first_order(fitter, fit) ** 2)) for fit in fits]
     return [fits[at] for at in np.argsort(rough, kind="stable")[:_FIRST]]
 
 
-def by_left_out(
+def predictive_mixture(
     fitter: Fitter, fits: Sequence[Fit]
 ) -> list[tuple[Fit, float, Float[np.ndarray, " runs"]]]:
     """Return how far to rely on the first of some hypotheses, and how they miss runs left out."""
@@ -111,7 +111,7 @@ def weights_of(missed: Float[np.ndarray, "fits runs"]) -> Float[np.ndarray, " fi
     return np.exp(logs - logsumexp(logs))
 
 
-def of_the_next_run(runs: int) -> float:
+def next_run_factor(runs: int) -> float:
     """Return the factor on the deviation of some misses that makes it that of the next.
 
     As few runs tell a deviation badly, Student's quantile is the wider.

@@ -74,7 +74,7 @@ class LinearErrors:
         """Return what the transducer of each row multiplies by."""
         return 1.0 + self._read_by @ sizes[: self._gains]
 
-    def as_read(
+    def transducer_reading(
         self, predicted: Float[np.ndarray, " rows"], sizes: Float[np.ndarray, " q"]
     ) -> Float[np.ndarray, " rows"]:
         """Return records by what transducers do, without what each run has of its own."""
@@ -152,7 +152,7 @@ class LinearErrors:
         place = {run.name: i for i, run in enumerate(fitted.rows.runs)}
         return np.array([place.get(run.name, -1) for run in self.rows.runs])
 
-    def apart(
+    def unshared_variance(
         self,
         predicted: Float[np.ndarray, " rows"],
         sizes: Float[np.ndarray, " q"],

@@ -13,7 +13,12 @@ from discover.inference.engine.bands import Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeFunction
-from discover.inference.engine.left_out import FEWEST_RUNS, by_first_order, by_left_out, left_out
+from discover.inference.engine.left_out import (
+    FEWEST_RUNS,
+    left_out,
+    predictive_mixture,
+    screened_to_first_order,
+)
 from discover.inference.engine.noise import LEAST
 from discover.inference.engine.problem import LOG_ODDS_OF_NONE, Problem
 from discover.inference.engine.rows import Rows
@@ -91,8 +96,8 @@ class Posterior:
     that are fitted. `explanations`: with their probabilities, the likeliest first. `unexplained`:
     probability that none of them is all that is there. `fits`: hypotheses that are possible, fitted
     to the fitted runs, with their probabilities. `left`: what the likeliest hypothesis leaves of
-    the fitted runs; None where none can be followed. `by_left_out`: hypotheses to rely on where
-    none is all there is, as they predict fitted runs that are left out, with their weights.
+    the fitted runs; None where none can be followed. `predictive_mixture`: hypotheses to rely on
+    where none is all there is, as they predict fitted runs that are left out, with their weights.
     `curves`: functions of one variable that are possible beside hypotheses, and have no name.
     """
 
@@ -102,7 +107,7 @@ class Posterior:
     unexplained: float
     fits: tuple[tuple[Fit, float], ...]
     left: DiscrepancyModel | None
-    by_left_out: tuple[tuple[Fit, float], ...] = ()
+    predictive_mixture: tuple[tuple[Fit, float], ...] = ()
     curves: tuple[FreeFunction, ...] = ()
     memory: dict = field(default_factory=dict)
 
@@ -114,19 +119,19 @@ class Posterior:
         return "effects_added" if self.explanations[0].members[0] else "no_effect_needed"
 
     @property
-    def relied_on(self) -> tuple[tuple[Fit, float], ...]:
+    def weighted_hypotheses(self) -> tuple[tuple[Fit, float], ...]:
         """Hypotheses that are possible and those that predict best, the weightiest first."""
-        none = self.unexplained if self.by_left_out else 0.0
+        none = self.unexplained if self.predictive_mixture else 0.0
         found: dict[int, tuple[Fit, float]] = {}
-        for share, fits in ((1.0 - none, self.fits), (none, self.by_left_out)):
+        for share, fits in ((1.0 - none, self.fits), (none, self.predictive_mixture)):
             for fit, weight in fits:
                 found[id(fit)] = fit, share * weight + found.get(id(fit), (fit, 0.0))[1]
         return tuple(sorted(found.values(), key=lambda pair: -pair[1]))
 
     @property
-    def predicting_best(self) -> list[tuple[Fit, float]]:
+    def best_predictive_laws(self) -> list[tuple[Fit, float]]:
         """Laws that predict runs left out best, for where none is all there is, with curves."""
-        return self.beside_curves(self.by_left_out or self.fits)
+        return self.mixed_with_curves(self.predictive_mixture or self.fits)
 
     def with_curves(self, curves: Sequence[FreeFunction]) -> "Posterior":
         """Return the posterior with functions among what may be there and has no name."""
@@ -139,7 +144,7 @@ class Posterior:
             self, explanations=explanations, unexplained=unexplained, curves=tuple(curves)
         )
 
-    def beside_curves(self, laws: Sequence[tuple[Fit, float]]) -> list[tuple[Fit, float]]:
+    def mixed_with_curves(self, laws: Sequence[tuple[Fit, float]]) -> list[tuple[Fit, float]]:
         """Return laws for where none is all there is, and those with a function beside them.
 
         These count by the fitted runs, as far as they stand out beyond functions that only stand
@@ -166,7 +171,7 @@ class Posterior:
     def interval(self, position: int) -> tuple[float, float] | None:
         """Return the 95 % interval of a constant, over the hypotheses in which it is free."""
         parts = []
-        for fit, probability in self.relied_on:
+        for fit, probability in self.weighted_hypotheses:
             if position in fit.priors and fit.covariance is not None:
                 at = fit.free.index(position)
                 parts.append(
@@ -219,7 +224,7 @@ class Posterior:
     @in_one_thread
     def bands(self, rows: Rows) -> list[Band | None]:
         """Return the bands of runs with their noise, by the fitted runs alone."""
-        return Predictions(self, rows, noise=True).bands(self.predicting_best)
+        return Predictions(self, rows, noise=True).bands(self.best_predictive_laws)
 
 
 @in_one_thread
@@ -232,13 +237,15 @@ def posterior_of(
     do not change. `whole`: by all runs, where that is known.
     """
     done = {} if before is None else before.memory
-    problem, near = search.problem, near_the_likeliest(search)
-    whole = whole or by_all_runs(search, done["whole"][0] if done else None)
-    judged = near if whole is search else whole.alive()
+    problem, near = search.problem, occams_window(search)
+    whole = whole or refitted_to_all_runs(search, done["whole"][0] if done else None)
+    judged = near if whole is search else whole.ranked()
     logs = np.array([whole.rank(fit) for fit in judged])
-    beside = [_left_by(whole, fit) for fit in judged[:_WITH_DISCREPANCY]]
+    beside = [_discrepancy_beside(whole, fit) for fit in judged[:_WITH_DISCREPANCY]]
     nothing = [whole.rank(one.fit) + one.log_factor + LOG_ODDS_OF_NONE for one in beside]
-    nothing += [whole.rank(fit) + _unlike_noise(whole.fitter, fit) for fit in judged[:1]]
+    nothing += [
+        whole.rank(fit) + _log_odds_of_smooth_misfit(whole.fitter, fit) for fit in judged[:1]
+    ]
     total = float(np.logaddexp.reduce([*logs, *nothing]))
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
     unexplained = float(np.exp(np.logaddexp.reduce(nothing) - total)) + lost if nothing else 1.0
@@ -251,34 +258,34 @@ def posterior_of(
     found.memory |= {**done, "whole": (whole, judged, beside)}
     if not near:
         return found
-    found.left = left = _left_by(search, near[0])
+    found.left = left = _discrepancy_beside(search, near[0])
     none = own[0] + np.logaddexp(
-        left.log_factor + LOG_ODDS_OF_NONE, _unlike_noise(search.fitter, near[0])
+        left.log_factor + LOG_ODDS_OF_NONE, _log_odds_of_smooth_misfit(search.fitter, near[0])
     )
     enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > _NEGLIGIBLE
     # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is
     if enough and none > among:
-        found.by_left_out = _foretelling(found)
-        fit = found.relied_on[0][0]
+        found.predictive_mixture = _predictive_mixture(found)
+        fit = found.weighted_hypotheses[0][0]
         if fit is not near[0]:
-            found.left = _left_by(search, fit)
+            found.left = _discrepancy_beside(search, fit)
     return found
 
 
-def near_the_likeliest(search: Search) -> list[Fit]:
+def occams_window(search: Search) -> list[Fit]:
     """Return hypotheses that count beside the likeliest, which comes first."""
-    alive = search.alive()
+    alive = search.ranked()
     return [fit for fit in alive if search.rank(fit) > search.rank(alive[0]) - WINDOW][:_MOST]
 
 
-def by_all_runs(search: Search, done: Search | None = None) -> Search:
+def refitted_to_all_runs(search: Search, done: Search | None = None) -> Search:
     """Return what is likely by the fitted runs, fitted to all, those too that are to be predicted.
 
     These judge: where the likeliest leaves something of all, nothing else is looked for that may
     leave less, and where it leaves nothing, what is as good. `done`: what was fitted to all before,
     beside which others come.
     """
-    problem, fits = search.problem, near_the_likeliest(search)
+    problem, fits = search.problem, occams_window(search)
     if problem.predicted is None:
         return search
     wanted = [*fits, search.found[frozenset()]]
@@ -291,13 +298,13 @@ def by_all_runs(search: Search, done: Search | None = None) -> Search:
             return done
         done = done.copied()
         done.add([done.fitter.start(fit.names, fit.theta) for fit in new])
-    alive = done.backwards().alive()
-    if alive and _left_by(done, alive[0]).log_factor + LOG_ODDS_OF_NONE < 0.0:
+    alive = done.backwards().ranked()
+    if alive and _discrepancy_beside(done, alive[0]).log_factor + LOG_ODDS_OF_NONE < 0.0:
         done.exchange()
     return done
 
 
-def _left_by(search: Search, fit: Fit) -> DiscrepancyModel:
+def _discrepancy_beside(search: Search, fit: Fit) -> DiscrepancyModel:
     """Return what a hypothesis leaves; one that is known if nothing has changed."""
     least, known = smallest(search, fit), fit.memory.get("left")
     if known is None or known.fit is not fit or known.smallest != least:
@@ -305,7 +312,7 @@ def _left_by(search: Search, fit: Fit) -> DiscrepancyModel:
     return known
 
 
-def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
+def _log_odds_of_smooth_misfit(fitter: Fitter, fit: Fit) -> float:
     """Return the log odds of a smooth misfit that no curve follows, and noise would be slow.
 
     Of all tests of noise only this one speaks of the fluid: noise that was rounded, smoothed or
@@ -324,13 +331,13 @@ def _unlike_noise(fitter: Fitter, fit: Fit) -> float:
     return float(np.log(-1.0 / (np.e * p * np.log(p)) - 1.0) + np.log(UNLIKE_NOISE))
 
 
-def _foretelling(posterior: Posterior) -> tuple[tuple[Fit, float], ...]:
+def _predictive_mixture(posterior: Posterior) -> tuple[tuple[Fit, float], ...]:
     """Return what predicts runs left out best, of what can be followed in the runs to predict."""
     search, rows = posterior.search, posterior.problem.predicted
-    first = by_first_order(search.fitter, search.alive())
+    first = screened_to_first_order(search.fitter, search.ranked())
     if rows is not None:
         first = Predictions(posterior, rows).followed(first) or first
-    found = by_left_out(search.fitter, first)
+    found = predictive_mixture(search.fitter, first)
     for fit, _, missed in found:
         fit.memory["missed"] = missed
     return tuple((fit, weight) for fit, weight, _ in found)

@@ -61,7 +61,7 @@ class Search:
         """Return the log of evidence times prior."""
         return fit.log_evidence + self.problem.log_prior(fit.names)
 
-    def alive(self) -> list[Fit]:
+    def ranked(self) -> list[Fit]:
         """Return hypotheses that are possible, the likeliest first."""
         usable = (fit for fit in self.found.values() if np.isfinite(fit.log_evidence))
         return sorted(usable, key=self.rank, reverse=True)
@@ -205,23 +205,23 @@ class Search:
             best[key][1].memory["scored"] = float(share), float(score)
         return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
 
-    def is_better_beside(self, fit: Fit) -> bool:
+    def improves_with_another_effect(self, fit: Fit) -> bool:
         """Try each effect beside the law of a fit, from its constants; return whether one helps.
 
         `fit`: at which a law is as it would be where something else is explained; of this search or
         with more that is linear in the records.
         """
-        best, linear = max(map(self.rank, self.alive())), fit.linear[: len(self.fitter.errors)]
+        best, linear = max(map(self.rank, self.ranked())), fit.linear[: len(self.fitter.errors)]
         starts = [self.fitter.start(fit.names, fit.theta, linear)]
         (here,) = self.fitter.fit(starts, rounds=0)
         self.add(self.scored(here), wanted=1)
-        return max(map(self.rank, self.alive())) > best
+        return max(map(self.rank, self.ranked())) > best
 
     def exchange(self) -> None:
         """Put another effect in the place of each of the best set, until nothing is better."""
         seen: set[Key] = set()
-        while self.alive():
-            best = self.alive()[0]
+        while self.ranked():
+            best = self.ranked()[0]
             if not best.names or frozenset(best.names) in seen:
                 return
             seen.add(frozenset(best.names))
@@ -245,17 +245,17 @@ class Search:
     def backwards(self) -> "Search":
         """Take effects out of the best sets again, and those that a fit put to zero."""
         for _ in range(_ROUNDS):
-            alive = self.alive()
+            alive = self.ranked()
             top = alive[0].log_likelihood if alive else -np.inf
             fallen = [
                 fit
                 for fit in self.found.values()
-                if fit.at_an_end and fit.log_likelihood > top - _FALLEN
+                if fit.vanished and fit.log_likelihood > top - _FALLEN
             ]
             fallen = sorted(fallen, key=lambda fit: -fit.log_likelihood)[:_BEST]
             starts = []
             for fit in [*alive[:_BEST], *fallen]:
-                for name in fit.at_an_end or fit.names:
+                for name in fit.vanished or fit.names:
                     # also one that was fitted before: it may have ended beside its best constants
                     names = tuple(other for other in fit.names if other != name)
                     way = fit.names, names

@@ -234,7 +234,7 @@ def simple_material(posterior: Posterior) -> SimpleFit | None:
     no run shows is not claimed.
     """
     search, problem = posterior.search, posterior.problem
-    fitter, alive = search.fitter, search.alive()
+    fitter, alive = search.fitter, search.ranked()
     runs = fitter.rows.runs
     control = runs[0].protocol.control
     if not all(describes(control, run) for run in runs) or not np.any(fitter.rows.recorded):

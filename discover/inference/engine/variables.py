@@ -168,7 +168,7 @@ class Response(Variable):
 
 
 @dataclass(frozen=True)
-class ClosedForm(Variable):
+class ClosedFormVariable(Variable):
     """A function of known form: so much of it, and its inner constant to first order.
 
     `form`, `inner`: one of `closed_forms`, and its inner constant over the largest value.
@@ -179,7 +179,7 @@ class ClosedForm(Variable):
     count: ClassVar[int] = 2
 
     @classmethod
-    def of(cls, variable: Variable, form: str, inner: float) -> "ClosedForm":
+    def of(cls, variable: Variable, form: str, inner: float) -> "ClosedFormVariable":
         """Return a form of what a variable is."""
         return cls(**vars(variable), form=form, inner=inner)
 
@@ -192,7 +192,7 @@ class ClosedForm(Variable):
         found = np.column_stack([here, (high - low) / (2.0 * step)])
         return found * np.sign(values)[:, None] if self.is_odd else found
 
-    def moved(self, sizes: Float[np.ndarray, " 2"]) -> "ClosedForm":
+    def moved(self, sizes: Float[np.ndarray, " 2"]) -> "ClosedFormVariable":
         """Return the form with the inner constant that sizes tell of."""
         with np.errstate(divide="ignore", invalid="ignore"):
             inner = self.inner + np.nan_to_num(sizes[1] / sizes[0], posinf=0.0, neginf=0.0)

@@ -14,7 +14,7 @@ from discover.inference.engine.variables import (
     INNER,
     KNOTS,
     SLIP_CURVE,
-    ClosedForm,
+    ClosedFormVariable,
     Variable,
     closed_forms,
     variables,
@@ -55,10 +55,10 @@ class _WithColumns(LinearErrors):
         own = self.variable.columns(predicted)
         return np.column_stack([super().columns(predicted, shifts), own])
 
-    def as_read(self, predicted, sizes):
+    def transducer_reading(self, predicted, sizes):
         """Return records by what transducers do and the function."""
         own = self.variable.columns(predicted) @ sizes[-self.variable.count :]
-        return super().as_read(predicted, sizes) + own
+        return super().transducer_reading(predicted, sizes) + own
 
     def recorded(self, predicted, sizes, shifts):
         """Return records of trials, of what the model predicts of each."""
@@ -124,7 +124,7 @@ class WithFunction(Fitter):
         sizes, covariance = best.linear[-KNOTS:], best.covariance[-KNOTS:, -KNOTS:]
         x = variable.grid(best.predicted, KNOTS + 1)[1:]
         _, (form, inner, amount) = _nearest(variable, x, variable.basis(x), sizes, covariance)
-        closed, start = ClosedForm.of(variable, form, inner), np.array([amount, 0.0])
+        closed, start = ClosedFormVariable.of(variable, form, inner), np.array([amount, 0.0])
         fitter, found, q = self, list(fits), len(self.bare.errors)
         for _ in range(_SETTLED):
             last = WithFunction(self.bare, closed, WIDTHS[-1])

@@ -70,8 +70,8 @@ def choose_member(
 
     The likeliest of those that fit; without noise the fewest varying tensors near the least misfit.
     `misfits`: relative, on all runs; where constants suffice the first member is taken. `resolved`:
-    relative misfit that a rheometer does not resolve. `surprise`: from `surprises`, where noise
-    hides more.
+    relative misfit that a rheometer does not resolve. `surprise`: from `negative_log_evidence`,
+    where noise hides more.
     """
     least = float(np.min(misfits))
     fits = misfits <= max(FITS * least, resolved)

@@ -20,7 +20,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import default_library, law_below
 from discover.learners.tbnn_ude import ensemble
-from discover.learners.tbnn_ude.evidence import surprises
+from discover.learners.tbnn_ude.evidence import negative_log_evidence
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
@@ -117,7 +117,7 @@ class TBNNUDE(RunPrediction):
         misfits = ensemble.member_misfits(members, problem)
         resolved, surprise = _resolved(recipe), None
         if isinstance(recipe, DefaultRecipe) and np.min(misfits) > resolved and trained[0].varies:
-            surprise = surprises(members, problem)
+            surprise = negative_log_evidence(members, problem)
         chosen, fits = ensemble.choose_member(trained, misfits, resolved, surprise)
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
 

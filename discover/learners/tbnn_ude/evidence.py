@@ -24,7 +24,7 @@ from discover.programs import compiled
 from discover.statistics import independent_samples
 
 
-def surprises(
+def negative_log_evidence(
     laws: Sequence[TensorBasisNetwork], problem: TrainingProblem
 ) -> Float[np.ndarray, " laws"]:
     """Return −2 ln E of every law; the least is the likeliest.
@@ -41,7 +41,7 @@ def surprises(
         return np.where(squares == squares[best], 0.0, np.inf)
     precision = _independent(misses[best], problem.records.seen) / squares[best]
     twice = at_twice_the_rate(problem)
-    enduring = np.isfinite(squares) & [endures(law, twice) for law in laws]
+    enduring = np.isfinite(squares) & [stable_at_double_rate(law, twice) for law in laws]
     found = np.full(len(laws), np.inf)
     usable = enduring if np.any(enduring) else np.isfinite(squares)
     for i in np.flatnonzero(usable).tolist():
@@ -57,7 +57,7 @@ def at_twice_the_rate(problem: TrainingProblem) -> TrainingProblem:
     return eqx.tree_at(lambda tree: tree.flows, problem, twice)
 
 
-def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
+def stable_at_double_rate(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
     """Return whether a law's stress stays finite in the flows of a problem."""
     return bool(np.all(np.isfinite(np.asarray(variational.trajectories(law, problem).states))))
 

@@ -12,16 +12,16 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.files import kept_in_files
-from discover.learners.tbnn_ude.evidence import surprises
+from discover.learners.tbnn_ude.evidence import negative_log_evidence
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
 from discover.learners.tbnn_ude.session import (
     Progress,
     Session,
+    concurrent_trainings,
     functions_along,
     initial_law,
     invariant_sizes,
     nearly_constant_functions,
-    race_of_functions,
     without_network,
 )
 
@@ -66,7 +66,7 @@ def train_default(
     found, left_out = [], _LEFT_OUT
     if work(problem) <= recipe.affordable:
         start = initial_law(key, recipe.width, linear_relaxation, scale, base_law)
-        penalised_race, raced = race_of_functions(session, start)
+        penalised_race, raced = concurrent_trainings(session, start)
         found = [_finish(session, raced, penalised_race, True, what)]
         left_out = ""
     if not found or found[0].misfit > recipe.resolved:
@@ -87,7 +87,7 @@ def train_default(
         return replace(_finish(session, law, penalised, False, end), left_out=left_out)
     if len(found) == 1:
         return replace(found[0], left_out=left_out)
-    order = np.argsort(surprises([one.law for one in found], problem), kind="stable")
+    order = np.argsort(negative_log_evidence([one.law for one in found], problem), kind="stable")
     first, *others = (found[i] for i in order)
     return replace(first, others=tuple(others), left_out=left_out)
 

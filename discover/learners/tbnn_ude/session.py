@@ -234,7 +234,7 @@ _MORE_ROUNDS = 4  # with the least penalty, while they pay: near laws that diver
 _STILL_GAINS = 0.95  # white or not, a residual that still falls so much holds more than noise
 
 
-def race_of_functions(
+def concurrent_trainings(
     session: Session, start: TensorBasisNetwork
 ) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
     """Return the best law of few tensors with varying coefficients, before and after polish."""

@@ -108,7 +108,7 @@ def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
     ``exact``: no record of these runs distinguishes the two.
     """
     rivals = []
-    for fit in search.alive():
+    for fit in search.ranked():
         if fit is chosen or len(fit.names) > len(chosen.names):
             continue
         exact = search.indistinguishable(fit, chosen)
@@ -121,7 +121,7 @@ def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
 
 def inclusion(search: SupportSearch) -> dict[str, float]:
     """Return the posterior probability of each term, were the law among those fitted."""
-    fits = search.alive()
+    fits = search.ranked()
     logs = np.array([search.rank(fit) for fit in fits])
     weights = np.exp(logs - np.logaddexp.reduce(logs))
     found = {

@@ -43,7 +43,7 @@ def library_problem(
                 f"{own[0]!r} is a record of its own, which use_normal_stresses would fit once "
                 "more. Leave out one of the two."
             )
-        observed += [run.observing(quantity) for run in runs for quantity in run.beside]
+        observed += [run.observing(quantity) for run in runs for quantity in run.also_recorded]
     terms = [library_term(term) for term in library.terms]
     return Problem(declared_as(known), terms, observed, computed=True)
 
@@ -161,9 +161,9 @@ class SupportSearch(Search):
         (empty,) = self.add([self.fitter.start((), self.problem.zero)])
         asked: set[Key] = set()
         highest = -np.inf
-        while self.alive() and self.rank(self.alive()[0]) > highest:
-            highest = self.rank(self.alive()[0])
-            centres = [fit for fit in self.alive() if frozenset(fit.names) not in asked][:_BEAM]
+        while self.ranked() and self.rank(self.ranked()[0]) > highest:
+            highest = self.rank(self.ranked()[0])
+            centres = [fit for fit in self.ranked() if frozenset(fit.names) not in asked][:_BEAM]
             starts: dict[Key, tuple[Fit, Fit]] = {}
             for centre in centres:
                 asked.add(frozenset(centre.names))
@@ -179,7 +179,7 @@ class SupportSearch(Search):
                 if not np.isfinite(fit.log_posterior)
             ]
             self.add(lost)
-            best = self.alive()[0] if self.alive() else empty
+            best = self.ranked()[0] if self.ranked() else empty
             self.say(f"{len(self.found)} laws fitted; {', '.join(best.names) or 'no term'}")
         self.backwards()
         self.exchange()
@@ -189,7 +189,7 @@ class SupportSearch(Search):
 
     def _finish(self) -> None:
         """Fit laws that may be the answer, and the best of each size, to the end."""
-        alive = self.alive()
+        alive = self.ranked()
         near = [fit for fit in alive if self.rank(fit) > self.rank(alive[0]) - _NEAR][:_MOST_NEAR]
         known = {id(fit) for fit in near}
         near += [fit for fit in self.path() if id(fit) not in known]
@@ -200,7 +200,7 @@ class SupportSearch(Search):
         """Return the best fit of each size, from empty to as dense as was tried."""
         found = []
         for size in range(self.most + 1):
-            ranked = [fit for fit in self.alive() if len(fit.names) == size]
+            ranked = [fit for fit in self.ranked() if len(fit.names) == size]
             if not ranked:
                 break
             tied = [fit for fit in ranked if self.indistinguishable(fit, ranked[0])]

@@ -32,17 +32,17 @@ Drawn = Picture | Missing
 def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn]]:
     """Return the pictures of what was found, and those of training."""
     found: list[tuple[str, Callable[[], Picture | None]]] = []
-    for flow in comparison.judged:
+    for flow in comparison.unseen_flows:
         draw = flow_picture if flow.oscillatory else start_up_picture
         found.append((f"The picture of {flow.title}", partial(draw, comparison, flow)))
     runs = ("The picture of the training runs", partial(training_picture, comparison))
-    if not comparison.judged:  # what was fitted is then all that shows a law at work
+    if not comparison.unseen_flows:  # what was fitted is then all that shows a law at work
         found.append(runs)
     found += [
         ("The map of errors", partial(error_map_picture, comparison)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
     ]
-    return _drawn(found), _drawn([runs] if comparison.judged else [])
+    return _drawn(found), _drawn([runs] if comparison.unseen_flows else [])
 
 
 def _drawn(pictures: Sequence[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:

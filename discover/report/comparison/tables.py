@@ -21,12 +21,12 @@ from discover.report.wording import known, learner_as_subject, percent, sentence
 def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the errors in flows that no fit saw, with half of the band where there is one."""
     rows = []
-    for flow in comparison.judged:
+    for flow in comparison.unseen_flows:
         cells = []
         for who in ("before", *comparison.outcomes):
             band = None if who == "before" else comparison.outcomes[who].bands.get(flow.key)
             if who == "tensor_sindy":
-                band = comparison.claimed(flow) if comparison.determined_terms else None
+                band = comparison.determined_band(flow) if comparison.determined_terms else None
             widths = {} if band is None else band.half_widths()
             finite = {name: width for name, width in widths.items() if known(width)}
             law = comparison.before if who == "before" else comparison.outcomes[who].predictions
@@ -55,7 +55,7 @@ def laws_fitted(comparison: Comparison) -> dict[str, Any]:
     Errors are means, of the recorded stress, over the flows that no fit saw, those inside the
     fitted range apart from those beyond it, and whether there are such.
     """
-    placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
+    placed = {flow.name: comparison.placement(flow).inside for flow in comparison.unseen_flows}
     rows = [
         {
             "law": fit.title,
@@ -72,7 +72,7 @@ def laws_fitted(comparison: Comparison) -> dict[str, Any]:
         for fit in comparison.classical
     ]
     for name, outcome in comparison.outcomes.items():
-        errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
+        errors = {flow.name: comparison.errors(name, flow) for flow in comparison.unseen_flows}
         left = comparison.lack_of_fit.get(name)
         number = outcome.details.get("n_constants")  # None of a learner that does not say
         if outcome.learner == "tensor_sindy":
@@ -216,7 +216,7 @@ def learner_lines(comparison: Comparison) -> list[str]:
 
 def _parts(comparison: Comparison, name: str, outcome: LearnerOutcome) -> Iterator[str]:
     yield _of_learner(comparison, name, outcome)
-    lost = [flow.title for flow in comparison.judged if outcome.predictions[flow.key] is None]
+    lost = [flow.title for flow in comparison.unseen_flows if outcome.predictions[flow.key] is None]
     if lost:
         yield f"{learner_as_subject(name)} diverges in {words.listed(lost)}"
     apart = {q: off for q, off in comparison.disagreement.items() if off > _DIFFERS}

@@ -173,7 +173,7 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
         label = "networks that fit as well"
         colour = look.learner_style("tbnn_ude")["color"]
         limits.append((members.low[quantity], members.high[quantity], colour, label))
-    band = comparison.claimed(flow)
+    band = comparison.determined_band(flow)
     if band is not None and np.any(np.isfinite(band.low[quantity])):
         limits.append((band.low[quantity], band.high[quantity], look.SPARSE, "95 % band"))
     for low, high, colour, label in limits:

@@ -59,7 +59,7 @@ def _draw_run(panel, run: Run) -> None:
     time = run.time[every]
     given_stress = run.protocol.control == "stress"
     panel.plot(time, run.recorded[every], color=look.NETWORK, lw=1.4, label="recorded")
-    for quantity, colour in zip(run.beside, (look.SPARSE, look.GREEN), strict=False):
+    for quantity, colour in zip(run.also_recorded, (look.SPARSE, look.GREEN), strict=False):
         values = run.observing(quantity).recorded[every]
         panel.plot(time, values, color=colour, lw=1.0, label=FIGURE_SYMBOLS[quantity])
     other = panel.twinx()
@@ -158,7 +158,7 @@ def _amplitude_sweep(run: Run, sweep: LinearSweep | None) -> look.Picture:
 def _flow_curve(run: Run, sweep: LinearSweep | None) -> look.Picture:
     marked = {"color": look.NETWORK, "marker": "o", **_POINTS}
     stresses: list[look.Curve] = [(run.rate, run.stress, {**marked, "label": "σ₁₂"})]
-    for quantity, colour in zip(run.beside, (look.SPARSE, look.GREEN), strict=False):
+    for quantity, colour in zip(run.also_recorded, (look.SPARSE, look.GREEN), strict=False):
         style = {"color": colour, "marker": "^", "label": FIGURE_SYMBOLS[quantity], **_POINTS}
         stresses.append((run.rate, run.observing(quantity).recorded, style))
     steady = run.stress / run.rate

@@ -42,7 +42,7 @@ _ALIKE = 0.8  # share of them that is read equally often
 _ONE_STEP = 1e-6  # by which jumps of one step differ, over it
 
 
-def read_times(record: Float[np.ndarray, " n"]) -> int:
+def hold_length(record: Float[np.ndarray, " n"]) -> int:
     """Return the hold length of a record: how often each value is read; 1 if new or by chance.
 
     And of what rises evenly in the steps of a converter, which repeats values too.
@@ -74,7 +74,7 @@ def rms(values: ArrayLike) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def squared_distance(
+def squared_mahalanobis_distance(
     difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
 ) -> float:
     """Return dᵀ (I + FᵀF)⁻¹ d by singular values, which bear draws that nearly diverge."""

@@ -18,7 +18,7 @@ _NEIGHBOURHOOD = 31
 _PASSES = 5
 
 
-def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+def isolated_outliers(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     """Return which samples of a record are outliers: off the record before and after them.
 
     One or two samples are outliers if extrapolation from before, from after, and interpolation all

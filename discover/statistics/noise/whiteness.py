@@ -92,7 +92,7 @@ def _spectra(n: int):
     return (1.0 / spectra).T, 0.5 * np.sum(np.log(spectra), axis=1)
 
 
-def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
+def independence_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     """Return the probability of neighbours that agree so much, if each sample is separate.
 
     Points of a flow curve or sweep are experiments of their own, without correlated noise. Products
@@ -110,7 +110,7 @@ def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     return float((1 + np.count_nonzero(drawn >= own)) / (1 + _LOTS))
 
 
-def fast_part(values: Float[np.ndarray, " n"]) -> float:
+def sample_to_sample_noise(values: Float[np.ndarray, " n"]) -> float:
     """Return the standard deviation of what changes from sample to sample.
 
     From the median of third differences, which smooth sequences and a few jumps hardly change
@@ -121,10 +121,10 @@ def fast_part(values: Float[np.ndarray, " n"]) -> float:
     return float(1.4826 * np.median(np.abs(np.diff(values, 3))) / np.sqrt(comb(6, 3)))
 
 
-def noise_beside(rows: Rows, sizes: Float[np.ndarray, " runs"]) -> Float[np.ndarray, " runs"]:
+def fast_noise(rows: Rows, sizes: Float[np.ndarray, " runs"]) -> Float[np.ndarray, " runs"]:
     """Return the noise of runs in a residual that is more than noise: what of it is fast.
 
     `sizes`: the most it may be, as that of a run too short to tell is.
     """
     told = [len(row) >= FEWEST_FAST for row in rows]
-    return np.where(told, np.minimum([fast_part(row) for row in rows], sizes), sizes)
+    return np.where(told, np.minimum([sample_to_sample_noise(row) for row in rows], sizes), sizes)
