@@ -230,8 +230,11 @@ def number(text: str, where: str) -> float:
     return float(text)
 
 
-Text, Texts, Number, Place = str | None, list[str] | None, float | None, Path | None
-"""Options that may be left out; of several texts, one that may be given several times."""
+Text = str | None
+Texts = list[str] | None
+"""An option that may be given several times."""
+Number = float | None
+Place = Path | None
 StudyArgument = Annotated[
     Path, Argument(help="Study file (TOML); discover data import writes one.", show_default=False)
 ]

@@ -27,8 +27,10 @@ class WrittenState:
 
 
 Kind = Literal["constitutive", "kinematic", "signal"]
-Constants, Rates = Float[Array, " p"], Float[Array, " n"]
-Number, Levels = Float[Array, ""], Float[Array, "*levels"]
+Constants = Float[Array, " p"]
+Rates = Float[Array, " n"]
+Number = Float[Array, ""]
+Levels = Float[Array, "*levels"]
 
 Scale = Literal[
     "one", "sampling_time", "run_time", "inverse_rate", "strain", "stress", "inverse_stress",

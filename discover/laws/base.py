@@ -106,8 +106,8 @@ class AbstractConstitutiveLaw(eqx.Module):
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
         """Return dσ/dt, and that of the variables, all dimensionless.
 
-        `stress`: (3, 3), or 11, 22, 33, 12 with the variables behind, of which L may be a shear
-        rate.
+        `stress`: (3, 3) with L of (3, 3); or 11, 22, 33, 12 with the variables behind, with four
+        components of L or the scalar shear rate.
         """
         rate = rate_of_deformation(velocity_gradient)
         own = stress_in(stress)

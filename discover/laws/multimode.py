@@ -21,17 +21,12 @@ from tensor_library.algebra import VelocityGradient, rate_of_deformation
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
-    if _holds_traced(value):
+    parts = value if isinstance(value, list | tuple) else [value]
+    if any(isinstance(one, Tracer) for one in parts):
         return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
     # with NumPy, without a program for each shape
     modes = np.atleast_1d(as_numbers("The modes of a fluid, in Pa and s,", value, finite=False))
     return jnp.asarray(modes, dtype=jnp.result_type(float))
-
-
-def _holds_traced(value: Any) -> bool:
-    return isinstance(value, Tracer) or (
-        isinstance(value, list | tuple) and any(isinstance(one, Tracer) for one in value)
-    )
 
 
 def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:

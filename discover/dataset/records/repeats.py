@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -49,46 +50,36 @@ def count_flows(runs: Sequence[Run]) -> int:
 
 
 def _same_test(one: Run, other: Run) -> bool:
-    numbers: list[tuple[object, object]] = [
-        (one.rate_before, other.rate_before), (one.strain_before, other.strain_before),
-    ]  # fmt: skip
+    numbers: list[tuple[Any, Any]]
+    numbers = [(one.rate_before, other.rate_before), (one.strain_before, other.strain_before)]
     for name in {*one.metadata, *other.metadata} - set(_NO_CONDITION):
-        pair = one.metadata.get(name), other.metadata.get(name)
-        if any(isinstance(value, int | float) for value in pair):
-            numbers.append(pair)
-    alike = one.protocol.flow == other.protocol.flow and one.quantity == other.quantity
-    times = _common_times(one, other)
-    if times is None or not alike or not all(_alike(*pair) for pair in numbers):
+        numbers.append((one.metadata.get(name), other.metadata.get(name)))
+    if one.protocol.flow != other.protocol.flow or one.quantity != other.quantity:
         return False
-    longer = max((one, other), key=lambda run: run.time[-1])
-    if np.ptp(times) < _SHARED * max(np.ptp(one.time), np.ptp(other.time)):
-        times = np.append(times, longer.time[longer.time > times[-1]])
-    return all(_same_rates(one, other, some) for some in (times, _before(one, other)))
-
-
-def _same_rates(one: Run, other: Run, times: np.ndarray) -> bool:
-    rates = shear_rates(one.protocol, times), shear_rates(other.protocol, times)
-    off, most = np.max(np.abs(rates[0] - rates[1]), initial=0.0), np.max(np.abs(rates), initial=0.0)
-    return bool(off <= _SAME * most)
-
-
-def _before(one: Run, other: Run) -> np.ndarray:
-    """Return times between the knots of both protocols before the record: of a step, a flow."""
-    knots = [np.asarray(run.protocol.table_times) for run in (one, other)]
-    ahead = np.unique(np.minimum(np.concatenate(knots), 0.0))
-    return 0.5 * (ahead[1:] + ahead[:-1])
-
-
-def _alike(one: object, other: object) -> bool:
-    if not isinstance(one, int | float) or not isinstance(other, int | float):
-        return False
-    return one == other or abs(one - other) <= _SAME * max(abs(one), abs(other))
-
-
-def _common_times(one: Run, other: Run) -> np.ndarray | None:
     fewer, more = sorted((one, other), key=len)
-    inside = (fewer.time >= more.time[0]) & (fewer.time <= more.time[-1])
-    return fewer.time[inside] if np.count_nonzero(inside) >= _FEWEST_SAMPLES else None
+    times = fewer.time[(fewer.time >= more.time[0]) & (fewer.time <= more.time[-1])]
+    if len(times) < _FEWEST_SAMPLES or not all(_alike(*pair) for pair in numbers):
+        return False
+    if np.ptp(times) < _SHARED * max(np.ptp(one.time), np.ptp(other.time)):
+        longer = max((one, other), key=lambda run: run.time[-1])
+        times = np.append(times, longer.time[longer.time > times[-1]])
+    # between the knots of both protocols before the record: of a step, or a flow
+    knots = np.concatenate([run.protocol.table_times for run in (one, other)])
+    ahead = np.unique(np.minimum(knots, 0.0))
+    for some in (times, 0.5 * (ahead[1:] + ahead[:-1])):
+        rates = np.array([shear_rates(run.protocol, some) for run in (one, other)])
+        most = np.max(np.abs(rates), initial=0.0)
+        if np.max(np.abs(rates[0] - rates[1]), initial=0.0) > _SAME * most:
+            return False
+    return True
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Return whether two conditions agree; words say nothing, and a number is to stand in both."""
+    are_numbers = [isinstance(value, int | float) for value in (one, other)]
+    if not all(are_numbers):
+        return not any(are_numbers)
+    return one == other or abs(one - other) <= _SAME * max(abs(one), abs(other))
 
 
 def is_copy(one: Run, other: Run) -> bool:

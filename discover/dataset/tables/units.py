@@ -77,6 +77,10 @@ def tidy_unit(text: str) -> str:
 
 _SIGNS = str.maketrans({**dict.fromkeys("·⋅•∙・×", "*"), **dict.fromkeys("−–—‐‑", "-"), "μ": "µ"})
 _OPENING = {")": "(", "]": "[", "}": "{", ">": "<"}
+_AT_END = [
+    re.compile(rf"(.*?)\{a}((?:[^\{a}\{b}]|\{a}[^\{a}\{b}]*\{b})*)\{b}")
+    for b, a in _OPENING.items()
+]  # of any kind, one more of which may stand inside
 _BRACKETS = str.maketrans("（）［］｛｝＜＞【】〔〕〈〉", "()[]{}<>[][]<>")
 _IN = re.compile(r"(.*\S)\s+(?:in|en|em)\s+(\S.*)")
 # what stands in brackets and is no unit: Time (action), G(t), tan(delta)
@@ -101,18 +105,11 @@ def name_and_unit(name: str, unit: str) -> tuple[str, str]:
 
 def _last_bracket(name: str) -> tuple[str, str]:
     """Return what stands before the bracket in which a name ends, and in it; both may be empty."""
-    name = name.rstrip()
-    closing = name[-1:]
-    if closing not in _OPENING:
+    found = next(filter(None, (one.fullmatch(name.rstrip()) for one in _AT_END)), None)
+    # G(t) is a function, and Time (t) in tons
+    if found is None or found[2].strip() == "t":
         return "", ""
-    depth = 0
-    for at in range(len(name) - 1, -1, -1):
-        depth += (name[at] == closing) - (name[at] == _OPENING[closing])
-        if not depth:
-            head, inside = name[:at], name[at + 1 : -1].strip()
-            # G(t) is a function, and Time (t) in tons
-            return ("", "") if inside == "t" else (head.rstrip(" /,"), inside)
-    return "", ""
+    return found[1].rstrip(" /,"), found[2].strip()
 
 
 def _is_unit(text: str) -> bool:

@@ -15,9 +15,9 @@ _EXPONENT = -0.5  # δ of Likhtman & Graham
 
 
 class RoliePoly(AbstractConstitutiveLaw):
-    """h = 2 (λ/τ_R)(1 − 1/Λ)(A + β Λ^{2δ} σ), A = I + σ, Λ = √(tr A/3), δ = −1/2.
+    """Rolie–Poly law   [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11].
 
-    [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11]
+    h = 2 (λ/τ_R)(1 − 1/Λ)(A + β Λ^{2δ} σ), with A = I + σ, Λ = √(tr A/3) and δ = −1/2.
     """
 
     stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_R/λ
