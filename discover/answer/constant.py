@@ -158,7 +158,9 @@ class Constant:
         if self.ci95 is None or not 0.0 < (width := self.ci95[1] - self.ci95[0]) < math.inf:
             return ""
         largest = max(map(abs, (*self.ci95, self.value)))
-        of_width, of_value = (math.floor(math.log10(size)) for size in (width, largest))
+        of_width, of_value = (
+            math.floor(math.log10(size)) for size in (width, abs(self.value) or largest)
+        )
         decimals = min(1 - of_width, max(2 - of_value, -of_width))
         if decimals < 0 and value:  # a small number beside a large one keeps two digits
             decimals = min(max(decimals, 1 - math.floor(math.log10(abs(value)))), 0)

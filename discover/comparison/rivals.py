@@ -135,7 +135,7 @@ def _rival_of(twin: identify.Twin, beyond: Sequence[str]) -> Rival:
         place = {"protocol": best.flow, "quantity": best.quantity}
     reason = twin.text
     if beyond:
-        reason += f" (The library that was searched does not hold {', '.join(beyond)}.)"
+        reason += f" Not in the library searched: {', '.join(beyond)}."
     return Rival(twin.law, reason, separated_by=place)
 
 

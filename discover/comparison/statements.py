@@ -121,8 +121,7 @@ def _said_of(quantity, verdict, flows, bands, structure, spread, terms) -> State
     width = f"± {percent_of(max(half_width, 1e-5))}{of_n1} (95 %)"
     if half_width > NARROW:
         return Statement(quantity, "no", f"Its band is {width} at the widest.")
-    text = f"{width} at the widest, if the law is in the library."
-    return Statement(quantity, IN_LIBRARY, text)
+    return Statement(quantity, IN_LIBRARY, f"{width} at the widest.")
 
 
 def _widest(quantity: str, flows: Sequence[Flow], bands: Mapping[str, FlowBand]) -> float | None:

@@ -66,13 +66,13 @@ class Twin(NotebookView):
         )
         apart = []
         if not self.keeps_N1:
-            apart.append(f"N1 by {percent_of(self.difference.N1)}")
+            apart.append(f"N1 by up to {percent_of(self.difference.N1)}")
         if self.difference.N2 > side_by_side.SAME:
-            apart.append(f"N2 by {percent_of(self.difference.N2)} of N1")
-        text += f"; {' and '.join(apart)} apart" if apart else "; N2 is the same too"
+            apart.append(f"N2 by up to {percent_of(self.difference.N2)} of N1")
+        text += f", but differs in {' and '.join(apart)}." if apart else ", and the same N2."
         if self.separated_by:
-            text += "; " + " or ".join(s.text for s in self.separated_by) + " would tell"
-        return text + "."
+            text += f" To distinguish, measure {' or '.join(s.text for s in self.separated_by)}."
+        return text
 
     def line(self) -> dict[str, Any]:
         """Return the twin as one line of a table: by how much it differs, what would tell."""

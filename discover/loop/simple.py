@@ -94,10 +94,10 @@ def check_of(material: SimpleMaterial) -> str:
         return _CHECKS[material.kind]
     first, consistency, index = material.constants
     low, high = first.ci95 or (first.value, first.value)
-    below, above = _BELOW * low, high / _BELOW
+    below, above = (float(f"{one:.2g}") for one in (_BELOW * low, high / _BELOW))
     rate = ((above - first.value) / consistency.value) ** (1.0 / index.value)
     slow, fast, flows = (significant(one, 2) for one in (below, above, rate))
-    return f"Creep at {slow} Pa and {fast} Pa until steady: by this law 0 and {flows} 1/s."
+    return f"Creep at {slow} and {fast} Pa until steady: this law gives 0 and {flows} 1/s."
 
 
 _BELOW = 0.9  # Stress of a creep over the yield stress, far enough from it to be told in an hour

@@ -266,13 +266,14 @@ def inclusion(result: LoopResult) -> str:
         return ", ".join(f"{name} {percent(p)}" for name, p in pairs)
 
     kinds = {KINDS[kind]: p for kind, p in told.inclusion_by_kind.items()}
-    effects = [(effect_title(name), p) for name, p in told.inclusion.items()][:_MOST_INCLUDED]
+    likely = [(name, p) for name, p in told.inclusion.items() if p >= _LEAST_INCLUDED]
+    effects = [(effect_title(name), p) for name, p in likely][:_MOST_INCLUDED]
     if not effects:
         return ""
     return f"{listed(effects)} (any effect {listed(kinds.items())})."
 
 
-_MOST_INCLUDED = 8
+_MOST_INCLUDED, _LEAST_INCLUDED = 8, 0.005
 
 
 # Last words of what is a share of the root-mean-square stress

@@ -15,8 +15,8 @@ from markupsafe import Markup, escape
 
 from discover import words
 from discover._version import __version__
+from discover.answer import Constant, sentences
 from discover.answer import modes_in_words as modes
-from discover.answer import sentences
 from discover.equations.spelling.markup import term_element
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words
@@ -91,6 +91,7 @@ def _environment() -> Environment:
         significant=words.significant,
         interval=words.interval,
         estimate=words.estimate,
+        constant=lambda one: Constant("", one.value, one.ci95),
         readable=words.readable,
         subscripts=wording.subscripts,
         explained=wording.explained,

@@ -97,8 +97,8 @@ def test_a_simple_material_is_named_with_its_constants(runs, law, constants):
 def test_a_yield_stress_is_tested_by_creep_at_stresses_below_and_above_its_interval():
     ends = (11.0, 13.0), (2.0, 4.0), (0.4, 0.6)
     fluid = material_of(SimpleFit("herschel_bulkley", (12.0, 3.0, 0.5), ends, 0.01, 5.0))
-    # a tenth below the one end and above the other; ((13/0.9 − 12)/3)² = 0.66
-    said = "Creep at 9.9 Pa and 14 Pa until steady: by this law 0 and 0.66 1/s."
+    # a tenth below the one end and above the other; ((14 − 12)/3)² = 0.44
+    said = "Creep at 9.9 and 14 Pa until steady: this law gives 0 and 0.44 1/s."
     assert check_of(fluid) == said
 
 

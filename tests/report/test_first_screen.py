@@ -367,7 +367,7 @@ def test_the_interval_comes_first_near_an_end_and_what_was_not_tested_behind_the
     # the table gives the value that the equation has, for it goes with the other constants
     assert screen_of(answer)["constants"][0][2] == "0.80"
     top = Constant("alpha", 0.997, (0.93, 1.0))
-    assert (top.number, top.in_equation) == ("1.00", 1.0)  # one number for one thing
+    assert (top.number, top.in_equation) == ("0.997", 0.997)  # one number for one thing
     assert Constant("epsilon", 0.4, (0.17, 0.82)).text == "ε = 0.40 (95 % CI 0.17–0.82)"
     told = "Not tested on unseen runs."
     screen = screen_of(fits_to_the_noise=True, failed=told, tolerance=0.1)

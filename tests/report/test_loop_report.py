@@ -54,7 +54,7 @@ def test_the_loop_report_holds_data_pictures_with_their_numbers_ranking_and_erro
         assert f'<figure id="{name}">' in page
         assert (written / "figures" / f"{name}.svg").is_file()
     told = ("do not distinguish it from", "rate gain", "<code>stress_gain</code>", "held-out runs")
-    for text in (*told, "0.69 to 0.71"):
+    for text in (*told, "0.690–\N{WORD JOINER}0.710"):
         assert text in page
     assert r"\begin{equation}" in (written / "equations.tex").read_text()
     for name in ("predictions.csv", "loop.json"):
@@ -85,7 +85,7 @@ def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tm
         assert text in page
     declared = page[page.index('<table id="declared"') :]
     row = declared[: declared.index("</table>")]
-    assert all(text in row for text in ("modulus_Pa", "41.5", "41 to 42", ">Pa<"))
+    assert all(text in row for text in ("modulus_Pa", "41.5", "41.0–\N{WORD JOINER}42.0", ">Pa<"))
     contents = json.loads((tmp_path / "loop.json").read_text())
     assert contents["folds"][0]["effects"] == ["tr(sigma)*sigma"]
     assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
@@ -104,7 +104,7 @@ def test_the_page_says_which_modes_the_data_leave_open(tmp_path, loop_page):
     page = loop_page(replace(loop_result(), stages=(stage,), verdict="unexplained"))
     table = page[page.index('<table id="by-mode-1"') :]
     rows = table[: table.index("</table>")].split("<tr>")[2:]
-    assert "0.08 to 0.12" in rows[0]
+    assert "0.080–\N{WORD JOINER}0.120" in rows[0]
     assert "not determined" not in rows[0]
     assert "not determined" in rows[1]
     assert "α (varies from mode to mode) at λ = 2 s" in page

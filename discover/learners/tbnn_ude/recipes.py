@@ -24,6 +24,7 @@ from discover.learners.tbnn_ude.session import (
     nearly_constant_functions,
     without_network,
 )
+from discover.words import percent_of
 
 _FAR = 0.1  # relative misfit of constants that no data have as noise
 
@@ -124,10 +125,10 @@ def _finish(
 ) -> Trained:
     misfit = session.misfit(law)
     settled = session.settled(law)
-    end = "the residual is noise or nothing" if settled else "the residual still has structure"
+    end = "noise only" if settled else "a systematic residual remains"
     return Trained(
         law, penalised, misfit, varies,
-        f"{what}; relative misfit {misfit:.2g}; {end}", tuple(session.taken) if varies else (),
+        f"{what}; misfit {percent_of(misfit)}; {end}", tuple(session.taken) if varies else (),
         tuple(session.passed_over),
     )  # fmt: skip
 

@@ -19,6 +19,7 @@ from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.search import SupportSearch, library_problem
 from discover.progress import Progress, by_lines
+from discover.words import percent_of
 from tensor_library import LawTerms, TermLibrary
 
 _ROUNDS = 8
@@ -141,8 +142,8 @@ class TensorSINDy(RunPrediction):
                 "n_observations": rows,
             },
             message=(
-                f"{len(self.terms_)} of {len(library)} terms leave a relative misfit of "
-                f"{misfit:.2g}; {len(search.found)} supports were fitted."
+                f"{len(self.terms_)} of {len(library)} terms; misfit {percent_of(misfit)}; "
+                f"{len(search.found)} sets of terms fitted."
             ),
         )
 

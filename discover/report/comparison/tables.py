@@ -128,7 +128,7 @@ def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> di
     """Return a law found with the known part below it, as mathematics, and how its fit ended."""
     message = (outcome.message[:1].upper() + outcome.message[1:]).rstrip(".")
     if (missed := outcome.details.get("projection_misfit")) is not None and outcome.terms:
-        message += f"; the terms above miss {percent(missed)} of what the network adds"
+        message += f"; the terms above reproduce the network's correction to {percent(missed)}"
     named = known.named
     if named is not None and not named.is_written:
         message += f". Add the h of the known law {named.law}, which has no written form"
@@ -225,21 +225,21 @@ def _parts(comparison: Comparison, name: str, outcome: LearnerOutcome) -> Iterat
         yield f"it differs from the posterior in {words.listed(told)}"
     checks = (comparison.physics.get(name) or {}).get("checks", ())
     if failed := [check["name"] for check in checks if check["passed"] is False]:
-        yield f"it fails {words.listed(failed)}"
+        yield f"failed checks: {words.listed(failed)}"
 
 
 def _of_learner(comparison: Comparison, name: str, outcome: LearnerOutcome) -> str:
     who = learner_as_subject(name)
     left = comparison.lack_of_fit.get(name)
-    missed = "" if left is None else f" and leaves {percent(left.misfit)}"
+    missed = "" if left is None else f"; misfit {percent(left.misfit)}"
     if len(outcome.terms) > _MOST_TERMS:
         return f"{who} has {len(outcome.terms)} terms{missed}"
     if name == "tbnn_ude":
         if not outcome.terms:
-            return f"{who} projects on no term{missed}"
+            return f"{who} is close to no term{missed}"
         largest = max(outcome.terms, key=lambda term: abs(term.coefficient))
         coefficient = f"{words.significant(largest.coefficient)} {words.readable(largest.term)}"
-        return f"{who} projects mostly on {coefficient}{missed}"
+        return f"{who} is mostly {coefficient}{missed}"
     share = comparison.shares.get(name, 0.0)
     chance = f" (probability {percent(share)})" if share else ""
     return f"{who} finds {terms_text(outcome)}{chance}{missed}"

@@ -273,9 +273,9 @@ def high_deborah_picture(comparison: Comparison) -> look.Picture | None:
     caption = (
         "γ̇ = 3 cos(De t), one cycle after the transient. As De grows the stress has no time to "
         "change the structure within a cycle, and the strain, 3/De, falls: the curve becomes an "
-        "ellipse (quasi-linear LAOS) although the rate is large. A law that names the rate, such "
-        "as Johnson–Segalman's, would bend it at any De if the strain were above one. I₃/I₁ is "
-        "the third harmonic of the truth over the first."
+        "ellipse (quasi-linear LAOS) although the rate is large. A law that contains the shear "
+        "rate explicitly (Johnson–Segalman) distorts it at any De once the strain exceeds one. "
+        "I₃/I₁ is the third harmonic of the truth over the first."
     )
     return look.row_of_panels("high_deborah", caption, panels, 9.0, 2.8) if panels else None
 
