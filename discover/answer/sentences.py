@@ -311,7 +311,7 @@ def _place(answer: Any) -> str:
         reduced = f" reduced to {modes.reduced_to(answer)}" if answer.shift_factors else ""
         if rates := _rates(one):
             return f"{tests}{rates}{reduced}"
-        return f"{tests}strains up to {modes.short(one.strain[1])}" * bool(tests and one.strain)
+        return f"{tests}strains up to {modes.short(one.strain[1])}" if tests and one.strain else ""
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
     return tests + (listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}")
 
