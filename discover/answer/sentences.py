@@ -334,9 +334,7 @@ def _place(answer: "Answer") -> str:
         )
         if rates := _rates(one):
             return f"{tests}{rates}{reduced}"
-        if not tests or one.strain is None:
-            return ""
-        return f"{tests}strains up to {modes.short(one.strain[1])}"
+        return f"{tests}strains up to {modes.short(one.strain[1])}" if tests and one.strain else ""
     told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
     return tests + (listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}")
 

@@ -14,7 +14,7 @@ from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.protocols.between_samples import RateStep
 from discover.protocols.control import paced_by
-from discover.protocols.history import after_steady_flow
+from discover.protocols.history import after_steady_flow, steady_rate_before
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
 from discover.statistics.noise.noise_model import rms
@@ -139,6 +139,8 @@ class Run(NotebookView):
         if self.rate_before != 0.0 and self.from_rest and self.time[-1] > 0.0:
             begun = after_steady_flow(self.protocol, self.rate_before, float(self.time[-1]))
             object.__setattr__(self, "protocol", begun)
+        elif rate := steady_rate_before(self.protocol, float(self.time[-1])):
+            object.__setattr__(self, "rate_before", rate)
         unpaced = self.protocol.control == "stress" and self.protocol.table_strains is None
         if unpaced and self.strain is not None:
             paced = paced_by(self.protocol, self.time, self.strain)

@@ -52,6 +52,19 @@ def after_steady_flow(protocol: FlowProtocol, rate: float, end: float) -> FlowPr
     return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
 
 
+def steady_rate_before(protocol: FlowProtocol, end: float) -> float:
+    """Return the rate in 1/s of a steady flow by which a protocol is begun; 0 of none.
+
+    `end`: time of the last sample, in s. A step of strain is over in less time and strain.
+    """
+    length, start_end = -float(protocol.begins), np.asarray(protocol.cycle)
+    if length <= 0.0 or np.ptp(start_end) or protocol.control != "rate":
+        return 0.0
+    rates = shear_rates(protocol, -length * np.linspace(1.0, 0.1, 10))
+    steady = length >= end or abs(rates[0]) * length >= 0.99 * STEADY_STRAIN
+    return float(rates[0]) if steady and not np.ptp(rates) else 0.0
+
+
 def after_step_strain(
     protocol: FlowProtocol, strain: float, first: float, duration: float = 0.0
 ) -> FlowProtocol:

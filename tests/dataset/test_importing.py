@@ -116,6 +116,19 @@ def test_an_import_is_repeated_from_its_mapping_file_alone(tmp_path):
     run(second, "--mapping", first / "import.toml", code=2)
 
 
+def test_a_table_with_two_columns_of_one_name_is_imported_again_alike(tmp_path):
+    rows = ["Shear rate [1/s],Shear rate [1/s],Shear stress [Pa],Torsion,Torsion"]
+    rows += [f"{r},{1.01 * r},{90.0 * r**0.6},{r},{r}" for r in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)]
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    first, _ = run(tmp_path, tmp_path / "a.csv")
+    before = (first / "flow_curve.csv").read_bytes()
+    run(tmp_path, "--mapping", first / "import.toml", "--overwrite")
+    assert (first / "flow_curve.csv").read_bytes() == before
+    # which of two is meant nothing says where neither is known for a strain
+    _, refused = run(tmp_path, tmp_path / "a.csv", "--column", "strain=Torsion", code=2)
+    assert "Two columns are named 'Torsion'" in refused.stderr
+
+
 def test_files_in_different_units_come_back_the_same_when_repeated(tmp_path):
     for name, unit, factor in (("a", "kPa", 1e-3), ("b", "Pa", 1.0)):
         rows = [f"Time [s],Shear rate [1/s],{'Stress' if name == 'a' else 'Shear stress'} [{unit}]"]

@@ -168,6 +168,17 @@ def test_what_a_protocol_did_before_the_record_makes_another_test(after):
     assert repeated_tests(runs) == (("2", "3"),)
 
 
+def test_a_run_knows_the_steady_flow_that_its_protocol_begins_with_and_no_step_of_strain():
+    def begun(protocol):
+        return replace(record("a", rate=0.1), protocol=protocol).rate_before
+
+    for before in (5.0, -0.02):
+        after = dc.after_steady_flow(dc.start_up(0.1), before, end=TIMES[-1])
+        assert begun(after) == pytest.approx(before)
+    lasting = dc.after_step_strain(dc.start_up(0.0), 0.5, first=TIMES[0], duration=TIMES[0])
+    assert (begun(dc.start_up(0.1)), begun(lasting)) == (0.0, 0.0)
+
+
 def waving(name, times):
     rates = 2.0 * np.cos(times)
     stress = Giesekus(0.3).respond(oscillation(2.0, 1.0), times).sigma12

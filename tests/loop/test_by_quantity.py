@@ -401,6 +401,7 @@ def test_a_range_of_rates_is_where_runs_stay_and_says_their_tests():
         "steps of rate", "start-up", "creep",
     )  # fmt: skip
     # relaxation after a step strain: at rest, so of no rate
+    assert range_of([record("relaxation.csv", 0.0, 0.1)]).tests == ("stress relaxation",)
     assert described(record("relaxation.csv", 0.0, 0.1)) == "relaxation.csv"
     assert described(FITTED[0]) == "the start-up at 0.1 1/s (slow)"
     backwards = replace(wave, rate=-wave.rate)

@@ -46,22 +46,26 @@ _SHORT = 3  # letters of a name that says too little without its unit
 
 
 def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
-    """Return the place of each quantity, `given` names first; InputError if one is there twice."""
+    """Return the place of each quantity, `given` names first: they win.
+
+    Of several columns of one name the first counts that would be read without it. Raises InputError
+    if none of several would.
+    """
     names = [name for name, _ in block.columns]
     found: dict[str, int] = {}
     for key in QUANTITIES:
+        ranks = {i: name_rank(key, *column) for i, column in enumerate(block.columns)}
+        places = {i: rank for i, rank in ranks.items() if rank is not None}
+        at = sorted(places, key=places.__getitem__)
         if key in given:
-            at = [i for i, name in enumerate(names) if name == given[key]]
-            at = at or [i for i, name in enumerate(names) if plain(name) == plain(given[key])]
-            if len(at) > 1:
+            own = [i for i, name in enumerate(names) if name == given[key]]
+            own = own or [i for i, name in enumerate(names) if plain(name) == plain(given[key])]
+            at = [i for i in at if i in own] if len(own) > 1 else own
+            if own and not at:
                 raise InputError(
                     f"Two columns are named {given[key]!r} (block at line {block.line}). Rename "
                     "one in the file."
                 )
-        else:
-            ranks = {i: name_rank(key, *column) for i, column in enumerate(block.columns)}
-            places = {i: rank for i, rank in ranks.items() if rank is not None}
-            at = sorted(places, key=places.__getitem__)
         numbers = [i for i in at if i in block.filled]
         if key == "time" and not numbers:
             numbers = [i for i in at if any(is_clock(row[i]) for row in block.cells)]
