@@ -140,7 +140,7 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
     run has in common: R misses are draws from one normal distribution of unknown deviation, whose
     density goes as the misfit to the power −R (see `predictive_mixture`). What fits σ12 best need
     not come nearest in N1, so runs count half, and a term without a law keeps its lower prior odds,
-    as does a function beside a law. Where that stands out and leaves nothing, it is all that counts.
+    as does a function beside a law. Where that stands out and leaves nothing it is all that counts.
     """
     if posterior.unexplained < 0.5:
         pairs = list(posterior.fits)
