@@ -206,7 +206,7 @@ def test_a_tolerance_counts_the_runs_that_miss_it_and_marks_the_quantities_above
 
 def test_constants_far_from_the_middle_of_their_intervals_are_a_set():
     skewed, even = Constant("epsilon", 0.80, (0.17, 0.82)), Constant("alpha", 0.2, (0.1, 0.3))
-    note = "best&nbsp;fit: use these<br>values together"
+    note = "best&nbsp;fit,<br>as one set"
     pair = replace(MELT, constants=(skewed, even))
     assert note in page_of(pair)
     assert note not in page_of(replace(pair, constants=(even,)))

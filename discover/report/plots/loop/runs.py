@@ -123,7 +123,7 @@ def drawn_runs(
                     panel.set_ylim(0.5 * float(np.min(seen)), 3.0 * float(np.max(seen)))
             elif high > THOUSANDS:
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
-            panel.set_title(short_title(record), fontsize=8)
+            panel.set_title(short_title(record), fontsize=8, linespacing=1.5)
         below = {panel for panel in axes[-1]}
         for panel, record in zip(panels, records, strict=True):
             if panel in below or not record.is_transient:
@@ -210,7 +210,7 @@ def lissajous_picture(result: LoopResult) -> look.Picture | None:
                 low, high = float(record.measured.min()), float(record.measured.max())
                 margin = 0.6 * (high - low) or 1.0
                 panel.set_ylim(low - margin, high + margin)
-            axes[0, column].set_title(short_title(record), fontsize=8)
+            axes[0, column].set_title(short_title(record), fontsize=8, linespacing=1.5)
             axes[0, column].set_xlabel("strain γ")
             axes[1, column].set_xlabel("γ̇ (1/s)")
         axes[0, 0].set_ylabel("elastic: σ₁₂ (Pa)")
