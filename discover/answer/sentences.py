@@ -67,8 +67,11 @@ def _law(answer: "Answer", most: int) -> str:
         if not (several and (one.name in _OF_MODES or one.letter.endswith("_+")))
         and not (answer.is_empirical and one.is_term)
     ]  # fmt: skip
-    own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
+    linear = (*_OF_MODES, "eta_s")
+    own = sorted(own, key=lambda one: (one.name in linear) is (answer.law is not None))
     certain = [one for one in own if not one.is_poor]
+    if any(one.is_poor and one.name in _OF_MODES for one in own):  # a solvent alone is no fluid
+        certain = [one for one in certain if one.name != "eta_s"]
     named, every = constants(certain[: max(most, 0)]), answer.constants
     if answer.law is None and len(every) > min(most, len(certain)):  # some alone are no law
         each = [one.symbol for one in every if one.over_modes is not None]
@@ -80,10 +83,14 @@ def _law(answer: "Answer", most: int) -> str:
         # a solvent, or modes faster than the data: a melt has the one and no other
         and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
         named.append(f"{len(answer.modes)} modes{' and η_s' * bool(and_viscosity)}")
-    elif answer.modes and not several and not own and not modes.is_plain(answer):
+    elif (
+        answer.modes
+        and not modes.is_plain(answer)
+        and [one.name for one in own] in ([], ["eta_s"] * len(named))
+    ):
         (mode,) = answer.modes
-        named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
-        named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
+        time = f"λ = {significant(mode.relaxation_time_s, 3)} s"
+        named = [f"G = {significant(mode.modulus_Pa, 3)} Pa", time, *named]
     for one in answer.constants:
         known = one.name in modes.OF_SWEEP and not one.is_poor
         if known and differ(one.ci95, answer.tolerance):
@@ -383,6 +390,9 @@ def suspects(answer: "Answer") -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
     if not answer.suspects:
         return ""
+    if not answer.fits_to_the_noise and answer.discrepancy and len(answer.discrepancy.by_run) == 1:
+        names = listed([effect_title(one.effect) for one in answer.suspects])
+        return f"One run does not tell {names} from what the law lacks."
     if len(answer.suspects) == 1:
         return f"{SUSPECTED}: {answer.suspects[0].text}."
     names = listed([effect_title(one.effect) for one in answer.suspects])

@@ -280,8 +280,9 @@ def _law(
     name, values = named
     title = LAWS[name].title
     if name == "ucm" and not shows_a_derivative(result):
-        title = title.replace(LAWS[name].title, "linear viscoelastic")
-        title += " (no nonlinear law determined)"
+        title = "linear viscoelastic (no nonlinear law determined)"
+    elif name == "ucm" and equation is not None and equation.solvent_viscosity:
+        title = "Oldroyd-B"
     return name, title, tuple(_law_first(values, found))
 
 

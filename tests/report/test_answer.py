@@ -145,6 +145,29 @@ def test_other_moduli_than_the_sweep_s_and_a_viscosity_beside_the_modes_are_in_t
         assert "η_s = 5.0 Pa s (4.0–6.0), 2 modes. " in told
 
 
+def test_a_solvent_is_told_with_modulus_and_time_and_never_alone():
+    viscosity = Constant("eta_s", 20.0, (19.0, 21.0), "Pa s")
+    modulus, time = (
+        Constant(name, value, (0.95 * value, 1.05 * value), unit)
+        for name, value, unit in (("modulus_Pa", 100.0, "Pa"), ("relaxation_time_s", 1.0, "s"))
+    )
+    plain = replace(MELT, title="Oldroyd-B", law="ucm", modes=(Mode(100.0, 1.0),), suspects=())
+    told = headline(plain, constants=(modulus, time, viscosity))
+    order = [told.index(symbol) for symbol in ("G = 100 Pa", "λ = 1.00 s", "η_s = 20.0 Pa s")]
+    assert order == sorted(order)
+    assert "G = 100 Pa, λ = 1 s, η_s = 20.0 Pa s" in headline(plain, constants=(viscosity,))
+    poor = replace(modulus, ci95=(1.0, 1e4))
+    assert "η_s" not in headline(plain, constants=(poor, time, viscosity))
+
+
+def test_one_run_suspects_nothing_of_the_instrument_that_the_law_may_lack():
+    one_run = replace(MELT, discrepancy=Discrepancy(0.13, (0.09, 2.0), {"a.csv": 0.13}))
+    assert "One run does not tell stress gain from what the law lacks." in one_run.lines
+    assert any(line.startswith("Suspected") for line in MELT.lines)
+    explained = replace(one_run, fits_to_the_noise=True, discrepancy=None)
+    assert any(line.startswith("Suspected") for line in explained.lines)
+
+
 @pytest.mark.parametrize(
     ("slowest", "said"),
     [(0.25, "De = λω ≤ 2."), (0.6, "De = λω = 0.6–2.")],
