@@ -123,8 +123,9 @@ class LinearErrors:
     ) -> Float[np.ndarray, "trials rows"]:
         """Return records of trials, of what the model predicts of each."""
         runs, k = len(self.rows.runs), shifts.shape[1]
-        own, zeros, rest = np.split(sizes, np.cumsum([self._gains, self._zeros.shape[1]]), axis=1)
-        gain = own @ self._read_by.T
+        behind = self._gains + self._zeros.shape[1]
+        zeros, rest = sizes[:, self._gains : behind], sizes[:, behind:]
+        gain = sizes[:, : self._gains] @ self._read_by.T
         if self._loaded:
             gain, rest = gain + rest[:, self.rows.run], rest[:, runs:]
         found = predicted * (1.0 + gain) + zeros @ self._zeros.T
