@@ -59,7 +59,8 @@ def _command(task: str, words: str) -> Callable[..., None]:
 
 
 compare = _command(
-    "run_compare", "Run both learners on the same data and write a comparison report."
+    "run_compare",
+    "Fit the data with sparse regression and a neural network; compare both laws.",
 )
 close_loop = _command(
     "run_close_loop",
