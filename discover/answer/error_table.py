@@ -63,7 +63,7 @@ def errors(answer: "Answer") -> list[Errors]:
             if by_law and by_law[-1] == row._replace(symbol=by_law[-1].symbol):
                 row = row._replace(symbol=f"{by_law.pop().symbol}, {symbol}")
             by_law.append(row)
-    of = "".join(f"{symbol}, " for symbol in only_quantity(answer))
+    of = f"{only_quantity(answer)}, ".removeprefix(", ")
     if (worst := worst_run(answer)) is not None:
         of_run = "" if worst[0].endswith(")") else of  # such a name has its quantity
         measured.insert(1, Row(f"{of_run}worst run in range", *worst))  # below σ12

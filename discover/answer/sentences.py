@@ -167,13 +167,10 @@ def after_noise(answer: "Answer") -> str:
     return f" after removing {percent_of(answer.noise)} noise" if answer.noise else ""
 
 
-def only_quantity(answer: "Answer") -> list[str]:
-    """Return the symbol of the one stress that was fitted; none of several."""
-    own = [SYMBOLS.get(_STRESSES.get(flow, flow), "") for flow in answer.range.flows]
-    return own if len(own) == 1 and own[0] else []
-
-
-_STRESSES = {"shear": "sigma12"}
+def only_quantity(answer: "Answer") -> str:
+    """Return the symbol of the one stress that was fitted; empty of several."""
+    flow, *others = answer.range.flows
+    return "" if others else SYMBOLS.get("sigma12" if flow == "shear" else flow, "")
 
 
 def _unseen(answer: "Answer") -> dict[str, Any]:

@@ -84,7 +84,10 @@ def _command(task: str, words: str) -> Callable[..., None]:
 
 
 app.command("compare")(
-    _command("run_compare", "Run both learners on the same data and write a comparison report.")
+    _command(
+        "run_compare",
+        "Fit the data with sparse regression and a neural network; compare both laws.",
+    )
 )
 app.command("close-loop")(
     _command(
