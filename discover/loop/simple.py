@@ -14,19 +14,24 @@ from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
+from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.whiteness import sample_to_sample_noise
 from discover.words import significant
 
 # Effect that is all that such a material has; another law stands for itself
 _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
 _AS_WELL = 1.1
+_FELT = 0.1  # Of the shear stress: thrust is tared to some per cent of the torque's range
 
 
 def simple_material_result(task: Task, posterior: Posterior) -> LoopResult | None:
     """Return the result for runs of a simple material; None where a law that relaxes is needed.
 
-    None as well where the declared law has this viscosity.
+    None as well where the declared law has this viscosity, or a normal stress that was recorded
+    besides shows elasticity.
     """
+    if any(map(_is_elastic, task.unfitted)):
+        return None
     found = simple_material(posterior)
     if found is None:
         return None
@@ -73,6 +78,12 @@ def simple_material_result(task: Task, posterior: Posterior) -> LoopResult | Non
         ),
         material=material,
     )  # fmt: skip
+
+
+def _is_elastic(run: Run) -> bool:
+    """Return whether a normal stress is more than its scatter, and than errors of its zero."""
+    size = rms(run.recorded)
+    return size > _FELT * rms(run.stress) and sample_to_sample_noise(run.recorded) < 0.5 * size
 
 
 def _predicted(problem: Problem, material: SimpleMaterial, runs: Sequence[Run]) -> np.ndarray:

@@ -1,5 +1,7 @@
 """A yield stress, a viscous fluid, a solid are named; laws that relax are not taken for one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from independent import Giesekus
@@ -170,6 +172,22 @@ def test_a_flow_curve_that_thins_shows_no_elasticity_where_no_time_is_known(stre
     assert found.material.law == law
     # control: beside a time that is known the same curve is one of a fluid that relaxes
     assert material_in(curve.runs) is None
+
+
+def test_a_normal_stress_recorded_besides_makes_no_viscous_fluid_unless_it_is_noise():
+    declared = DeclaredModel.named(
+        "ucm", {}, [1.0], [1.0], free=["modulus_Pa", "relaxation_time_s"]
+    )
+    curve = flow_curve(lambda r: 3.0 * r**0.5)
+    lot = np.random.default_rng(4)
+    elastic = 2.0 * RATES * (1.0 + 0.03 * lot.standard_normal(len(RATES)))
+    noise = 0.05 * curve.stress * lot.standard_normal(len(RATES))
+    found = []
+    for normal in (elastic, noise):
+        run = replace(curve, first_normal_stress_difference=normal)
+        result = run_loop(Dataset("curve", (run,)), declared, effects=FEW, max_effects=1)
+        found.append(result.material and result.material.law)
+    assert found == [None, "power_law"]
 
 
 def test_a_loop_and_a_comparison_name_a_yield_stress_alike_and_ask_no_learner(tmp_path):
