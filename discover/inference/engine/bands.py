@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,10 +18,6 @@ from discover.inference.engine.rows import Rows
 from discover.inference.engine.variables import SLIP_CURVE, Variable
 from discover.inference.engine.with_function import WithFunction
 from discover.statistics.noise.noise_model import rms
-
-if TYPE_CHECKING:  # which predict by what stands here
-    from discover.inference.engine.fits import Fitter
-    from discover.inference.engine.posterior import Posterior
 
 _RUNS_AWAY = 10.0
 """Times the largest stress recorded, or predicted as declared, which no sound law exceeds."""
@@ -75,9 +71,7 @@ class Predictions:
     them, or of the fluid alone. `noise`: whether with the noise of the fitted runs.
     """
 
-    def __init__(
-        self, posterior: "Posterior", rows: Rows, as_recorded: bool = True, noise: bool = False
-    ):
+    def __init__(self, posterior: Any, rows: Rows, as_recorded: bool = True, noise: bool = False):
         self.posterior, self.rows = posterior, rows
         self.as_recorded, self.noise = as_recorded, noise
         self.problem = posterior.problem
@@ -178,7 +172,7 @@ class Predictions:
 
     def _read(
         self,
-        fitter: "Fitter",
+        fitter: Any,
         record: Float[np.ndarray, "draws rows"],
         fit: Fit,
         linear: Float[np.ndarray, "draws q"],
@@ -239,9 +233,7 @@ class Predictions:
         return Band(middle, low, high)
 
 
-def moved(
-    posterior: "Posterior", fit: Fit
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def moved(posterior: Any, fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return weights of `credible_steps`, and constants, moduli, what is linear: before, by each.
 
     Weighted squares of what the steps change add up to a variance.
@@ -252,7 +244,7 @@ def moved(
 
 
 def credible_steps(
-    fitter: "Fitter", fit: Fit
+    fitter: Any, fit: Fit
 ) -> tuple[Float[np.ndarray, "steps n"], Float[np.ndarray, " steps"]]:
     """Return steps along each independent direction of what is uncertain, and their weights.
 
