@@ -26,7 +26,7 @@ TITLES = {
 
 def draw(comparison: Comparison) -> Picture:
     """Return σ12, N1 and N2 against the shear rate in a flow that no fit saw."""
-    flow = next(flow for flow in comparison.judged if flow.name == FLOW)
+    flow = next(flow for flow in comparison.unseen_flows if flow.name == FLOW)
     last = last_cycle(flow.times, flow.rate)
     with figure(1, 3, width=9.0, height=2.9) as (drawing, axes):
         for panel, quantity in zip(axes[0], QUANTITIES, strict=True):

@@ -115,7 +115,9 @@ for fit in comparison.classical if comparison else ():
     rows[fit.title] |= {"fitted": percent(fit.misfit), "criterion": f"{fit.criterion:.0f}"}
     rows[fit.title] |= {name: percent(fit.errors[name]["sigma12"]) for name in HELD_OUT}
 if comparison:
-    learnt = {flow.name: comparison.errors("tensor_sindy", flow) for flow in comparison.judged}
+    learnt = {
+        flow.name: comparison.errors("tensor_sindy", flow) for flow in comparison.unseen_flows
+    }
     rows["the sparse law"] = {name: percent(learnt[name]["sigma12"]) for name in HELD_OUT}
 pd.DataFrame(rows).T.fillna("")
 

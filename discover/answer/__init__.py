@@ -1,7 +1,8 @@
 """The answer: a law that one can use, how good it is, where, and what to measure next."""
 
-from discover.answer.answer import QUANTITIES, TOLERANCE, Answer, HasAnswer
+from discover.answer.answer import Answer, HasAnswer
 from discover.answer.constant import Constant
+from discover.answer.fields import QUANTITIES, TOLERANCE
 from discover.answer.parts import ExpectedError, Mode, Range, Suspect
 from discover.inference.engine.posterior import Discrepancy
 

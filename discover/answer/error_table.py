@@ -1,12 +1,10 @@
 """Table of errors: what unseen runs measured, then what nothing tested and laws differ by."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from discover.answer.fields import AnswerFields
 from discover.answer.sentences import SYMBOLS, after_noise, at_most, only_quantity, worst_run
 from discover.words import percent_of
-
-if TYPE_CHECKING:  # which is made of what stands here
-    from discover.answer.answer import Answer
 
 
 class Row(NamedTuple):
@@ -41,7 +39,7 @@ class Errors(NamedTuple):
         return f"{self.title}: {'; '.join(told)}."
 
 
-def errors(answer: "Answer") -> list[Errors]:
+def errors(answer: AnswerFields) -> list[Errors]:
     """Return errors of unseen runs, with the worst and the best classical law; then the untested.
 
     Quantities of which nothing is known for the same reason share a row.
@@ -82,7 +80,7 @@ _INSIDE, _BEYOND = "in\N{NO-BREAK SPACE}range", "beyond the range"
 _UNTESTED, _TWICE, _NOT_MEASURED = "Never tested", "at twice the highest rate", "not measured"
 
 
-def _title(answer: "Answer") -> str:
+def _title(answer: AnswerFields) -> str:
     """Return what the errors are, and the noise that they do not hold."""
     of = "Residual of the fitted runs"
     if not answer.expected("sigma12").is_residual:
@@ -90,7 +88,7 @@ def _title(answer: "Answer") -> str:
     return of + after_noise(answer)
 
 
-def _inside(answer: "Answer", one: Any) -> str:
+def _inside(answer: AnswerFields, one: Any) -> str:
     """Return the error in the range; of what the verdict calls noise, that there is none."""
     if one.inside is None:
         return _NOT_MEASURED

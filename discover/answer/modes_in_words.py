@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
+from discover.answer.fields import AnswerFields
 from discover.words import significant
 
-if TYPE_CHECKING:  # which is made of what stands here
-    from discover.answer.answer import Answer
+_Answer = TypeVar("_Answer", bound=AnswerFields)
 
 
 def degrees(temperature: float) -> str:
@@ -26,7 +26,7 @@ def scaled(factor: float) -> str:
     return f"{way} by {significant(by, 3)}"
 
 
-def at_use(answer: "Answer") -> "Answer":
+def at_use(answer: _Answer) -> _Answer:
     """Return an answer with its law at the temperature of the fitted runs, if they have one."""
     at, factors, modes = [*answer.range.by_temperature], answer.shift_factors, answer.modes
     by = factors.get(at[0]) if len(at) == 1 and answer.temperature_C is not None else None
@@ -46,7 +46,7 @@ def at_use(answer: "Answer") -> "Answer":
     )
 
 
-def shifts(answer: "Answer") -> list[tuple[float, float]]:
+def shifts(answer: AnswerFields) -> list[tuple[float, float]]:
     """Return temperatures of shifted runs with their factors: of many the first and the last."""
     found = [*answer.shift_factors.items()]
     return found if len(found) <= MOST_SHIFTS else [found[0], found[-1]]
@@ -55,7 +55,7 @@ def shifts(answer: "Answer") -> list[tuple[float, float]]:
 MOST_SHIFTS = 3
 
 
-def shifted(answer: "Answer") -> str:
+def shifted(answer: AnswerFields) -> str:
     """Return at which temperature times hold, and what shortens them; empty where nothing does."""
     if not answer.shift_factors:
         return ""
@@ -66,7 +66,7 @@ def shifted(answer: "Answer") -> str:
     return f"Moduli and times are for {reduced_to(answer.temperature_C)}; times: {', '.join(said)}."
 
 
-def is_plain(answer: "Answer") -> bool:
+def is_plain(answer: AnswerFields) -> bool:
     """Return whether the law has no units: one mode of 1 Pa and 1 s."""
     return [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
 
@@ -84,7 +84,7 @@ def short(value: float) -> str:
     return significant(value, 2)
 
 
-def linear_part(answer: "Answer") -> str:
+def linear_part(answer: AnswerFields) -> str:
     """Return modulus and time of one mode, of several the ends of the times; solvent and shifts."""
     modes = answer.modes
     if len(modes) == 1:
@@ -104,7 +104,7 @@ FEW_MODES = 4
 """Relaxation modes up to which their table is open."""
 
 
-def table(answer: "Answer") -> tuple[list[str], list[list[str]]]:
+def table(answer: AnswerFields) -> tuple[list[str], list[list[str]]]:
     """Return headings and rows of the modes, with constants that differ between them.
 
     From the shortest time to the longest, then one that was added; in brackets what the runs do not
@@ -122,7 +122,7 @@ def table(answer: "Answer") -> tuple[list[str], list[list[str]]]:
     return ["mode", "G (Pa)", "λ (s)", *(one.symbol for one in each)], rows
 
 
-def origin(answer: "Answer") -> str:
+def origin(answer: AnswerFields) -> str:
     """Return whether modes were given or fitted, and how many were added, in brackets."""
     added = sum(is_added(answer, one) for one in answer.modes)
     own = {one.name for one in answer.constants if one.ci95 is not None}
@@ -135,13 +135,13 @@ OF_SWEEP = {"modulus_factor": "moduli", "relaxation_time_factor": "relaxation ti
 """Factors on moduli or times of the sweep that the runs want, and on what."""
 
 
-def is_added(answer: "Answer", mode: Any) -> bool:
+def is_added(answer: AnswerFields, mode: Any) -> bool:
     """Return whether a mode was added to those that were declared."""
     added = (one.value for one in answer.constants if one.letter.startswith("G_+"))
     return any(math.isclose(mode.modulus_Pa, one, rel_tol=1e-6) for one in added)
 
 
-def as_constant(answer: "Answer", value: float, factor: str = "") -> str:
+def as_constant(answer: AnswerFields, value: float, factor: str = "") -> str:
     """Return a modulus, time or viscosity with the digits that it has among the constants.
 
     Two where a factor of these, such as ``modulus_factor``, is among them.

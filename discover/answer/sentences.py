@@ -1,13 +1,11 @@
 """Sentences of an answer; the first lines have at most sixty words."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from discover.answer import modes_in_words as modes
+from discover.answer.fields import AnswerFields
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
-
-if TYPE_CHECKING:  # which is made of what stands here
-    from discover.answer.answer import Answer
 
 _MOST_WORDS = 60
 # Constants that the first lines name until they are that short (-1: of a sum not even how
@@ -28,12 +26,12 @@ A_TRANSIENT = (
 """What to measure where nothing but states was."""
 
 
-def headline(answer: "Answer") -> str:
+def headline(answer: AnswerFields) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
     return " ".join(filter(None, first_lines(answer)))
 
 
-def first_lines(answer: "Answer") -> tuple[str, str]:
+def first_lines(answer: AnswerFields) -> tuple[str, str]:
     """Return the law by name with constants, then how well it describes and where to use it.
 
     As short as need be: what gives way is in the table. Without a law, what stands in its place.
@@ -55,7 +53,7 @@ def words(text: str) -> int:
     return sum(any(map(str.isalnum, one)) for one in text.split())
 
 
-def _law(answer: "Answer", most: int) -> str:
+def _law(answer: AnswerFields, most: int) -> str:
     """Return the law by name with at most so many of its constants."""
     if not answer.title:
         return answer.instead
@@ -111,7 +109,7 @@ def constants(several: Sequence[Any]) -> list[str]:
     return [one.with_interval(_LEVEL if one is first else "") for one in several]
 
 
-def is_a_set(answer: "Answer") -> bool:
+def is_a_set(answer: AnswerFields) -> bool:
     """Return whether constants go together: one is far from the middle of its interval.
 
     Intervals are over all laws that fit as well, so that ends of several make no law that does.
@@ -131,7 +129,7 @@ def differ(ci95: Sequence[float] | None, tolerance: float) -> bool:
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", *modes.OF_SWEEP)
 
 
-def description(answer: "Answer", brief: int = 0) -> str:
+def description(answer: AnswerFields, brief: int = 0) -> str:
     """Return how well the law describes the runs, and if that is enough.
 
     `brief`: 1 without the worst run, 2 without interval, 3 without whose errors several are and
@@ -162,24 +160,24 @@ def description(answer: "Answer", brief: int = 0) -> str:
     return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
 
 
-def after_noise(answer: "Answer") -> str:
+def after_noise(answer: AnswerFields) -> str:
     """Return that errors do not hold the noise."""
     return f" after removing {percent_of(answer.noise)} noise" if answer.noise else ""
 
 
-def only_quantity(answer: "Answer") -> str:
+def only_quantity(answer: AnswerFields) -> str:
     """Return the symbol of the one stress that was fitted; empty of several."""
     flow, *others = answer.range.flows
     return "" if others else SYMBOLS.get("sigma12" if flow == "shear" else flow, "")
 
 
-def _unseen(answer: "Answer") -> dict[str, Any]:
+def _unseen(answer: AnswerFields) -> dict[str, Any]:
     """Return errors of what was measured and not fitted, by symbol."""
     each = {symbol: answer.expected(name) for name, symbol in SYMBOLS.items()}
     return {s: one for s, one in each.items() if one.inside is not None and not one.is_residual}
 
 
-def _of_unseen(answer: "Answer", each: Mapping[str, Any], size: str, brief: int) -> str:
+def _of_unseen(answer: AnswerFields, each: Mapping[str, Any], size: str, brief: int) -> str:
     """Return mean errors of unseen runs: of each quantity where several were measured, or of all.
 
     And the worst of these, where one misses the tolerance and the range does not say it.
@@ -200,13 +198,13 @@ def _of_unseen(answer: "Answer", each: Mapping[str, Any], size: str, brief: int)
     return f"Mean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
-def _misses(answer: "Answer") -> bool:
+def _misses(answer: AnswerFields) -> bool:
     """Return whether unseen runs miss the tolerance in the mean, and at each rate."""
     found = answer.discrepancy
     return bool(answer.adequate is False and found and found.unseen and not found.met_up_to)
 
 
-def left_out(answer: "Answer", brief: int = 0) -> str:
+def left_out(answer: AnswerFields, brief: int = 0) -> str:
     """Return what of the instrument is no part of the fluid, and so of no simulation.
 
     `brief`: from 4 on of several no names, from 5 on nothing: the table has them.
@@ -221,7 +219,7 @@ def left_out(answer: "Answer", brief: int = 0) -> str:
 _OF_FITTED = "Residual of the fitted runs"
 
 
-def tolerance(answer: "Answer", brief: int = 0) -> str:
+def tolerance(answer: AnswerFields, brief: int = 0) -> str:
     """Return whether the tolerance is met, or unless `brief` in how many runs.
 
     Alone of several quantities that do and do not; empty where `where` says up to which rate.
@@ -253,7 +251,7 @@ _FLOWS = {
 }
 
 
-def usable(answer: "Answer") -> tuple[list[str], str]:
+def usable(answer: AnswerFields) -> tuple[list[str], str]:
     """Return for what the law may be used, and what else it predicts.
 
     That is what nothing tested and equally good laws agree in, up to the first that they do not.
@@ -277,7 +275,7 @@ def usable(answer: "Answer") -> tuple[list[str], str]:
     return tested, f"Untested: {listed([*implied])}; equally good laws agree within {apart}."
 
 
-def where(answer: "Answer") -> str:
+def where(answer: AnswerFields) -> str:
     """Return for what the law may be used, and in which flows; of no use, where it was fitted."""
     place, (quantities, implied) = _place(answer), usable(answer)
     if not place:
@@ -292,7 +290,7 @@ def where(answer: "Answer") -> str:
     return " ".join(filter(None, said))
 
 
-def _unsteady(answer: "Answer") -> str:
+def _unsteady(answer: AnswerFields) -> str:
     """Return from which rate on the law predicts no steady flow; empty where it does at each."""
     temperatures = [*answer.range.by_temperature]
     at = f" at {modes.degrees(temperatures[0])}" if len(temperatures) == 1 else ""
@@ -300,7 +298,7 @@ def _unsteady(answer: "Answer") -> str:
     return f"No steady flow above {above} (falling flow curve)." if above else ""
 
 
-def _in_part(answer: "Answer", place: str) -> str:
+def _in_part(answer: AnswerFields, place: str) -> str:
     """Return where each run meets the tolerance, and by how much others miss it; empty if none."""
     worst, one = worst_run(answer), answer.range
     if worst is None or not (met := answer.met_up_to):
@@ -316,7 +314,7 @@ def _in_part(answer: "Answer", place: str) -> str:
     return f" in {flows}: {within} at {slow}; up to {worst[1]} off at {number}–{high} 1/s"
 
 
-def _place(answer: "Answer") -> str:
+def _place(answer: AnswerFields) -> str:
     """Return rates and frequencies of the fitted runs, by the temperature of the measurement.
 
     In numbers without units where the modes have none.
@@ -358,12 +356,12 @@ def _rates(one: Any) -> str:
     return ", ".join(found)
 
 
-def _over_tolerance(answer: "Answer") -> dict[str, float]:
+def _over_tolerance(answer: AnswerFields) -> dict[str, float]:
     """Return runs that are missed by more than the tolerance, with their discrepancy."""
     return {name: size for name, size in answer.error_by_run.items() if size > answer.tolerance}
 
 
-def worst_run(answer: "Answer") -> tuple[str, str] | None:
+def worst_run(answer: AnswerFields) -> tuple[str, str] | None:
     """Return name and error of the run that is missed most; None where all are within tolerance."""
     over = _over_tolerance(answer)
     if not over:
@@ -383,7 +381,7 @@ MUCH, _LITTLE = 2.0, 1e-3
 """Relative errors from which on, and up to which, their size says nothing."""
 
 
-def suspects(answer: "Answer") -> str:
+def suspects(answer: AnswerFields) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
     if not answer.suspects:
         return ""
@@ -403,6 +401,6 @@ NOT_SEPARABLE = "sizes not separable"
 """What is said of several of them that these runs do not give a size each."""
 
 
-def separable(answer: "Answer") -> bool:
+def separable(answer: AnswerFields) -> bool:
     """Return whether the runs give each suspect a size of its own."""
     return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)

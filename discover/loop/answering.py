@@ -3,14 +3,13 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.answer import Answer, Constant, Mode, Suspect
 from discover.answer import modes_in_words as modes
-from discover.answer.answer import EMPIRICAL
+from discover.answer.fields import EMPIRICAL
 from discover.answer.naming import ByMode, named_law
 from discover.answer.simple_material import SimpleMaterial
 from discover.effects.registry import parameters_of
@@ -20,6 +19,7 @@ from discover.errors import InputError
 from discover.inference.engine.free_form import FreeForm
 from discover.laws.registry import LAWS
 from discover.loop import by_quantity
+from discover.loop.findings import LoopFindings
 from discover.loop.fitted_range import as_measured, range_of
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.runs import RunRecord
@@ -30,9 +30,6 @@ from discover.loop.sentences import (
     what_to_measure_next,
 )
 from discover.words import effect_title, effects_title, listed, percent_of, readable, significant
-
-if TYPE_CHECKING:  # which is made of what stands here
-    from discover.loop.loop_result import LoopResult
 
 _MOST_ADDED = 2  # Effects added to a law, up to which their sum is told as that law with these
 _SETTLED = 0.95  # Probability from which on nothing is said of other laws
@@ -52,7 +49,7 @@ _NOT_TESTED = {
 }
 
 
-def loop_answer(result: "LoopResult") -> Answer:
+def loop_answer(result: LoopFindings) -> Answer:
     """Return the answer of a closed loop."""
     following = what_to_measure_next(result)
     if result.verdict == "no_signal":
@@ -120,7 +117,7 @@ def _scatter(records: Sequence[RunRecord]) -> str:
     return f" of {noise} Pa rms; the sample's mean stress is below {most} Pa (95 %)"
 
 
-def _falls_above(result: "LoopResult") -> str:
+def _falls_above(result: LoopFindings) -> str:
     """Return the rate above which the law's flow curve falls, as it was measured; empty of none."""
     spread = result.spread_of_laws.get("sigma12")
     if spread is None or spread.falls_above is None:
@@ -140,7 +137,7 @@ def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
     return dict(sorted(found.items(), reverse=True))
 
 
-def _shown(result: "LoopResult") -> tuple[Equation | None, list[str]]:
+def _shown(result: LoopFindings) -> tuple[Equation | None, list[str]]:
     """Return a law that cannot be written out as a page shows it, constants at the mean mode.
 
     And the equations of effects that are in its h, but no sum of terms.
@@ -172,7 +169,7 @@ def rest_of_h(equations: Sequence[str]) -> str:
     return "\n".join([*([law] if summands else []), *where])
 
 
-def _of_material(result: "LoopResult", material: SimpleMaterial, following: str) -> Answer:
+def _of_material(result: LoopFindings, material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
     to_noise = result.verdict in EXPLAINED
@@ -197,7 +194,7 @@ def _of_material(result: "LoopResult", material: SimpleMaterial, following: str)
     return replace(answer, written=written | {"formula": material.formula})
 
 
-def _failed(result: "LoopResult") -> str:
+def _failed(result: LoopFindings) -> str:
     """Return what the law was not tested by."""
     if untested := untested_by(result):
         held_out = any(record.held_out for record in result.records)
@@ -205,7 +202,7 @@ def _failed(result: "LoopResult") -> str:
     return ""
 
 
-def _alternative(result: "LoopResult") -> str:
+def _alternative(result: LoopFindings) -> str:
     """Return what describes the same, or is the next likeliest; empty where the law is settled."""
     if twin := result.remaining.get("oil_twin"):
         thick, rises = significant(twin["viscosity"], 3), significant(twin["rise_time"], 2)
@@ -224,7 +221,7 @@ def _alternative(result: "LoopResult") -> str:
     return ""
 
 
-def _best_classical(result: "LoopResult") -> tuple[str, float] | None:
+def _best_classical(result: LoopFindings) -> tuple[str, float] | None:
     """Return the best law of the field, in words, and its error, for a sum without a name."""
     if (near := result.nearest_law) is None:
         return None
@@ -235,7 +232,7 @@ def _best_classical(result: "LoopResult") -> tuple[str, float] | None:
 
 
 def _law(
-    result: "LoopResult", equation: Equation | None
+    result: LoopFindings, equation: Equation | None
 ) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
@@ -303,7 +300,7 @@ def _falls(rate: Float[np.ndarray, " n"]) -> bool:
     return bool(abs(last) < 0.5 * max(ways) and swings_past < 0.2 * max(ways))
 
 
-def shows_a_derivative(result: "LoopResult") -> bool:
+def shows_a_derivative(result: LoopFindings) -> bool:
     """Return whether runs determine the convected derivative of a law without a nonlinear term.
 
     Its σ12 in shear is the linear one, so it takes a normal stress or an extension, or that nothing
@@ -344,7 +341,7 @@ def _of_function(found: FreeForm) -> Suspect:
     return Suspect(found.title, (Constant("reading", share, (low, high), meaning=where),))
 
 
-def _of_stage(result: "LoopResult", stage: Stage) -> tuple[Constant, ...]:
+def _of_stage(result: LoopFindings, stage: Stage) -> tuple[Constant, ...]:
     """Return the constants of an effect that was added, with letters that no other has."""
     letters = result.letters.get(stage.effect, {})
     return _constants(stage.parameters, stage.left_open, stage.effect, letters)

@@ -2,21 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri
 
 from discover.answer import Discrepancy, ExpectedError
 from discover.answer.modes_in_words import degrees, span
+from discover.loop.findings import LoopFindings
 from discover.loop.fitted_range import as_measured, by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.statistics.noise.noise_model import rms
 from discover.words import counted, listed, percent_of, significant
-
-if TYPE_CHECKING:  # which is made of what stands here
-    from discover.loop.loop_result import LoopResult
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
@@ -44,7 +41,7 @@ def of_fitted(records: Sequence[RunRecord], error: float, noise: float) -> Discr
     return Discrepancy(size, (size, size), by_run)
 
 
-def with_unseen(result: "LoopResult") -> Discrepancy | None:
+def with_unseen(result: LoopFindings) -> Discrepancy | None:
     """Return the discrepancy of a closed loop, of all unseen runs in the range if there are any."""
     if result.discrepancy is None:
         return None
@@ -64,7 +61,7 @@ def with_unseen(result: "LoopResult") -> Discrepancy | None:
     )
 
 
-def _met_up_to(result: "LoopResult", by_run: Mapping[str, float]) -> str:
+def _met_up_to(result: LoopFindings, by_run: Mapping[str, float]) -> str:
     """Return the rate up to which all runs meet the tolerance; empty where all do, or none."""
     own = sorted((r for r in result.records if r.name in by_run), key=lambda r: r.fastest)
     missed = [r.fastest for r in own if by_run[r.name] > result.tolerance]
@@ -76,7 +73,7 @@ def _met_up_to(result: "LoopResult", by_run: Mapping[str, float]) -> str:
     return f"{span((rate, rate))} 1/s"
 
 
-def unseen_errors(result: "LoopResult", kind: str = "") -> dict[str, float]:
+def unseen_errors(result: LoopFindings, kind: str = "") -> dict[str, float]:
     """Return errors without noise, by name of runs left out in turn, and of those held out.
 
     `kind`: quantity of `QUANTITIES` that these record; by default all of them.
@@ -95,7 +92,7 @@ def unseen_errors(result: "LoopResult", kind: str = "") -> dict[str, float]:
     return {name: error for name, error in found.items() if name in own}
 
 
-def _held_inside(result: "LoopResult") -> list[RunRecord]:
+def _held_inside(result: LoopFindings) -> list[RunRecord]:
     """Return runs held out of flows, quantities and rates that were fitted."""
     fitted = [record for record in result.records if not record.held_out]
     kinds = {(record.flow, record.quantity) for record in fitted}
@@ -110,7 +107,7 @@ def _held_inside(result: "LoopResult") -> list[RunRecord]:
     ]
 
 
-def errors_by_quantity(result: "LoopResult") -> dict[str, ExpectedError]:
+def errors_by_quantity(result: LoopFindings) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
@@ -123,7 +120,7 @@ def errors_by_quantity(result: "LoopResult") -> dict[str, ExpectedError]:
     return found
 
 
-def _by_law(result: "LoopResult", kind: str) -> ExpectedError:
+def _by_law(result: LoopFindings, kind: str) -> ExpectedError:
     """Return what is known of a stress that nothing measured: by how much equally good laws differ.
 
     No number is an error of what nothing tested. N2 is that of the law, unless they differ.
@@ -150,25 +147,25 @@ def _by_law(result: "LoopResult", kind: str) -> ExpectedError:
 _NOTHING = 1e-3  # N2 over N1 that rounding of the integration leaves
 
 
-def normal_stress_settled(result: "LoopResult") -> bool:
+def normal_stress_settled(result: LoopFindings) -> bool:
     """Return whether laws that describe the runs as well have one N1: more than linear response."""
     apart = differing(result, "N1")
     only_linear = all(record.control == "oscillation" for record in result.records)
     return apart is not None and apart < _APART and not only_linear
 
 
-def missed_size(result: "LoopResult") -> float:
+def missed_size(result: LoopFindings) -> float:
     """Return by how much a law misses the runs besides noise, zero where it does not."""
     missed = with_unseen(result)
     return 0.0 if missed is None else float(missed.size or 0.0)
 
 
-def differing(result: "LoopResult", kind: str) -> float | None:
+def differing(result: LoopFindings, kind: str) -> float | None:
     """Return by how much laws that fit as well differ in a quantity in the range."""
     return _spread(result, kind)[0]
 
 
-def _spread(result: "LoopResult", kind: str) -> tuple[float | None, float | None]:
+def _spread(result: LoopFindings, kind: str) -> tuple[float | None, float | None]:
     found = result.spread_of_laws.get(kind)
     if found is None:
         return None, None
@@ -180,7 +177,7 @@ def _spread(result: "LoopResult", kind: str) -> tuple[float | None, float | None
     return inside, beyond
 
 
-def of_stress(result: "LoopResult") -> ExpectedError:
+def of_stress(result: LoopFindings) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
     errors = unseen_errors(result, "sigma12")
     inside = _mean([*errors.values()])
@@ -197,7 +194,7 @@ def of_stress(result: "LoopResult") -> ExpectedError:
     return ExpectedError(inside, beyond, at, note=note, spread=spread)
 
 
-def measured(result: "LoopResult", kind: str) -> ExpectedError | None:
+def measured(result: LoopFindings, kind: str) -> ExpectedError | None:
     """Return the error of what was measured of a quantity, fitted or not; None without."""
     return of_records((*result.records, *result.unfitted), kind, result.noise_floor)
 

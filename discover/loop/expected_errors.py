@@ -1,7 +1,6 @@
 """Expected error of what was not fitted: how far laws that describe the runs as well differ."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +15,7 @@ from discover.inference.engine.fit import Fit
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.rows import Rows
 from discover.loop.by_quantity import BEYOND
+from discover.loop.parts import Spread
 from discover.processor import in_one_thread
 from discover.protocols import in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
@@ -29,27 +29,6 @@ _STRAIN, _HENCKY = 20.0, 3.0
 _LEAST_LIKELY = 0.01  # Of the likeliest law, below which one changes nothing
 
 _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Root-mean-square difference between laws that describe the runs as well.
-
-    `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
-    fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1,
-    by their rms, with the sign of N2/N1; None of other quantities. The largest in flows inside, of
-    which `over_n1_rate` in 1/s is the rate. `stress`: the quantity
-    itself by the reported law, rms in Pa of the fastest flow inside; None where it diverges.
-    `falls_above`, `steady`: of σ12 and of N1, see `steady_shear`.
-    """
-
-    inside: float | None
-    beyond: float | None
-    over_n1: float | None = None
-    stress: float | None = None
-    falls_above: float | None = None
-    over_n1_rate: float | None = None
-    steady: float | None = None
 
 
 @in_one_thread

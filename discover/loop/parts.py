@@ -278,3 +278,24 @@ class Fold:
     effects: tuple[str, ...]
     error_before: float
     error_after: float
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Root-mean-square difference between laws that describe the runs as well.
+
+    `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
+    fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1,
+    by their rms, with the sign of N2/N1; None of other quantities. The largest in flows inside, of
+    which `over_n1_rate` in 1/s is the rate. `stress`: the quantity
+    itself by the reported law, rms in Pa of the fastest flow inside; None where it diverges.
+    `falls_above`, `steady`: of σ12 and of N1, see `steady_shear`.
+    """
+
+    inside: float | None
+    beyond: float | None
+    over_n1: float | None = None
+    stress: float | None = None
+    falls_above: float | None = None
+    over_n1_rate: float | None = None
+    steady: float | None = None

@@ -1,7 +1,7 @@
 """What a closed loop asks of its result in sentences: doubt, tests, what to measure next."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from discover import words
 from discover.answer import Constant
@@ -9,11 +9,9 @@ from discover.answer.modes_in_words import OF_SWEEP, reduced_to
 from discover.answer.sentences import A_TRANSIENT, MUCH, SYMBOLS, differ
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
+from discover.loop.findings import LoopFindings
 from discover.loop.fitted_range import as_measured, by_temperature, described
 from discover.loop.runs import RunRecord
-
-if TYPE_CHECKING:  # which is made of what stands here
-    from discover.loop.loop_result import LoopResult
 
 MOST_NAMES = 3
 
@@ -31,12 +29,12 @@ def several(names: Sequence[str]) -> str:
     return " and ".join(shown)
 
 
-def untested_by(result: "LoopResult") -> str:
+def untested_by(result: LoopFindings) -> str:
     """Return why no run could have refuted what fits the runs; empty where one could."""
     return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""
 
 
-def suspected(result: "LoopResult") -> list[Any]:
+def suspected(result: LoopFindings) -> list[Any]:
     """Return the effects that are no part of the fluid, those with a size and the surest first."""
     own = [stage for stage in result.stages if stage.kind != "constitutive"]
 
@@ -47,7 +45,7 @@ def suspected(result: "LoopResult") -> list[Any]:
     return sorted(own, key=order)
 
 
-def doubted(result: "LoopResult") -> float | None:
+def doubted(result: LoopFindings) -> float | None:
     """Return the probability of what was added, where that is less than even; None otherwise.
 
     Effects each of which is likelier there than not are not doubted, however many others may stand
@@ -64,7 +62,7 @@ def doubted(result: "LoopResult") -> float | None:
     return own.probability
 
 
-def what_to_measure_next(result: "LoopResult") -> str:
+def what_to_measure_next(result: LoopFindings) -> str:
     """Return what would say most: more signal, a check of an effect, another test."""
     if result.verdict == "no_signal":
         # stress of a fluid that thins grows less than its rate
@@ -119,7 +117,7 @@ _CHECKS = {
 }
 
 
-def _extreme(result: "LoopResult") -> dict[str, str]:
+def _extreme(result: LoopFindings) -> dict[str, str]:
     """Return the fitted runs of the largest stress and of the largest rate, in words."""
     own = [r for r in result.records if not r.held_out and r.quantity not in ("N1", "N2")]
     strongest = max(own, key=lambda one: float(abs(one.measured).max()))
@@ -127,7 +125,7 @@ def _extreme(result: "LoopResult") -> dict[str, str]:
     return {"strongest": described(strongest), "fastest": described(fastest)}
 
 
-def _of_sweep(result: "LoopResult") -> str:
+def _of_sweep(result: LoopFindings) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
@@ -136,7 +134,7 @@ def _of_sweep(result: "LoopResult") -> str:
     return ""
 
 
-def _of_unfitted(result: "LoopResult") -> str:
+def _of_unfitted(result: LoopFindings) -> str:
     """Return what was measured besides, not fitted and missed; empty where nothing."""
     for kind in ("uniaxial", "N1"):
         found = measured(result, kind)
@@ -158,7 +156,7 @@ def _as_clause(check: str) -> str:
     return check if check[1:2].isdigit() else check[:1].lower() + check[1:]
 
 
-def _of_another_stress(result: "LoopResult") -> str:
+def _of_another_stress(result: LoopFindings) -> str:
     """Return the stress that laws differ in which fit as well; empty where none is open.
 
     And where they miss what was measured by more than tolerance and noise: it then comes first.
@@ -176,7 +174,7 @@ def _of_another_stress(result: "LoopResult") -> str:
     return ""
 
 
-def _of_predicted_n1(result: "LoopResult") -> str:
+def _of_predicted_n1(result: LoopFindings) -> str:
     """Return that N1 tests a law which predicts it; empty where it does not, or no one can."""
     fitted = any(record.quantity == "N1" for record in result.records)
     if fitted or not normal_stress_settled(result) or not _is_in_reach(result, "N1"):
@@ -188,11 +186,11 @@ def _of_predicted_n1(result: "LoopResult") -> str:
     return f"Measure N1 in steady shear at {_fastest(_sheared(result))}{what}."
 
 
-def _sheared(result: "LoopResult") -> list[RunRecord]:
+def _sheared(result: LoopFindings) -> list[RunRecord]:
     return [r for r in result.records if r.flow == "shear" and not r.held_out]
 
 
-def _is_in_reach(result: "LoopResult", kind: str) -> bool:
+def _is_in_reach(result: LoopFindings, kind: str) -> bool:
     """Return whether a stress can be measured, at the fastest fitted rate."""
     if not (shear := _sheared(result)):
         return False
@@ -216,7 +214,7 @@ _LEAST_NORMAL_STRESS = 1.0
 _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
 
 
-def _by_geometry(result: "LoopResult") -> str:
+def _by_geometry(result: LoopFindings) -> str:
     """Return which run to repeat where nothing says whether instrument or fluid is amiss.
 
     The fitted one that is missed most, by its own size.
@@ -230,7 +228,7 @@ def _by_geometry(result: "LoopResult") -> str:
     return f"Repeat {run} with another gap; {after}."
 
 
-def _telling_test(result: "LoopResult") -> str:
+def _telling_test(result: LoopFindings) -> str:
     """Return the test that distinguishes the likeliest explanation from others; empty if none."""
     following = result.next_tests
     best = following.best

@@ -10,6 +10,7 @@ from test_loop_report import loop_result
 from discover.answer import Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
 from discover.answer.modes_in_words import linear_part, origin, span, table
 from discover.answer.naming import named_law
+from discover.answer.sentences import SUSPECTED
 from discover.answer.simple_material import material_of
 from discover.equations import Equation, NamedPart
 from discover.equations.spelling.markup import plain
@@ -163,9 +164,9 @@ def test_a_solvent_is_told_with_modulus_and_time_and_never_alone():
 def test_one_run_suspects_nothing_of_the_instrument_that_the_law_may_lack():
     one_run = replace(MELT, discrepancy=Discrepancy(0.13, (0.09, 2.0), {"a.csv": 0.13}))
     assert "One run does not tell stress gain from what the law lacks." in one_run.lines
-    assert any(line.startswith("Suspected") for line in MELT.lines)
+    assert any(line.startswith(SUSPECTED) for line in MELT.lines)
     explained = replace(one_run, fits_to_the_noise=True, discrepancy=None)
-    assert any(line.startswith("Suspected") for line in explained.lines)
+    assert any(line.startswith(SUSPECTED) for line in explained.lines)
 
 
 @pytest.mark.parametrize(
