@@ -13,6 +13,7 @@ from discover.forward import AugmentedModel, DeclaredModel
 from discover.loop.answering import _constants, shows_a_derivative
 from discover.loop.by_quantity import beyond_noise, errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread, steady_shear
+from discover.loop.findings import LoopFindings
 from discover.loop.fitted_range import described, range_of
 from discover.loop.from_posterior import FinishedSearch
 from discover.loop.parts import ErrorPair, Stage, StageParameter
@@ -46,7 +47,9 @@ def result(records, left=0.06, **more):
         "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
         "remaining": {}, "declared_parameters": {}, "free_form": (), "unfitted": (),
     }  # fmt: skip
-    return SimpleNamespace(**(found | more))
+    made = object.__new__(LoopFindings)  # of parts that are made up as well
+    vars(made).update(found | more)
+    return made
 
 
 FITTED = [record("slow", 0.1, 0.02), record("middle", 0.3, 0.03), record("fast", 1.0, 0.05)]
@@ -111,7 +114,7 @@ def test_a_run_beyond_the_rates_does_not_count_inside():
 
 def test_each_quantity_has_the_error_of_its_own_unseen_runs_and_fitted_ones_a_residual():
     found = result([FITTED[0]], left=None)
-    found.discrepancy = Discrepancy(0.02, (0.01, 0.03))
+    vars(found)["discrepancy"] = Discrepancy(0.02, (0.01, 0.03))
     assert not with_unseen(found).unseen
     assert errors_by_quantity(found)["sigma12"].inside is None
     normal = record("slow (N1)", 0.1, 0.05, quantity="N1")
@@ -150,9 +153,9 @@ def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
     recorded = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
     found = result(recorded, spread_of_laws=close)
     assert errors_by_quantity(found)["N1"].note == "measured but not used"
-    found.spread_of_laws = {}
+    vars(found)["spread_of_laws"] = {}
     assert errors_by_quantity(found)["N1"].missing == "measured but not used"
-    found.spread_of_laws = {"N1": Spread(0.6, 0.8)}
+    vars(found)["spread_of_laws"] = {"N1": Spread(0.6, 0.8)}
     unsure = errors_by_quantity(found)["N1"].note
     assert unsure == "not determined, above 20 %, measured but not used"
     assert told["N2"].note == "N2/N1 ≈ −0.09 at 0.1 1/s by this law"
@@ -249,14 +252,14 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
     assert what_to_measure_next(found) == (
         "Measure N1 in steady shear at 1 1/s: the law predicts 250 Pa."
     )
-    found.records = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
+    vars(found)["records"] = [replace(FITTED[0], has_normal_stress=True), *FITTED[1:]]
     assert what_to_measure_next(found).startswith("Fit N1 too, which runs recorded")
     # not where it cannot be measured, was, or other effects make the same records
     check = "To confirm linear PTT, extend it."
     known["N1"] = replace(known["N1"], stress=0.5)
     assert what_to_measure_next(found) == check
     known["N1"] = replace(known["N1"], stress=100.0)
-    found.records = [*FITTED, record("slow", 0.1, 0.05, quantity="N1")]
+    vars(found)["records"] = [*FITTED, record("slow", 0.1, 0.05, quantity="N1")]
     assert what_to_measure_next(found) == check
     found.records, found.stages = FITTED, (replace(law, aliases=("wall_slip",)),)
     assert what_to_measure_next(found).startswith("To distinguish linear PTT from wall slip")
@@ -276,7 +279,7 @@ def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement(
     assert errors_by_quantity(found)["sigma12"].beyond_at == (
         "measured at 20–50 1/s at −23 °C, equivalent to 200–500 1/s at −10 °C"
     )
-    found.tolerance = 0.1
+    vars(found)["tolerance"] = 0.1
     assert what_to_measure_next(found).startswith("Measure N1 at 100 1/s and −10 °C: equally")
     # what was not shifted, or has no known temperature, is told as it is
     assert not range_of(FITTED).by_temperature
@@ -303,7 +306,7 @@ def test_what_was_measured_and_missed_but_not_fitted_is_fitted_next():
     assert errors_by_quantity(found)["uniaxial"].note == "1 run at 0.3 1/s, not fitted"
     told = what_to_measure_next(found)
     assert told == "Fit the recorded uniaxial extension too."
-    found.tolerance = 0.55
+    vars(found)["tolerance"] = 0.55
     assert what_to_measure_next(found).startswith("Measure N1")
     both = replace(held, flow="uniaxial", held_out=False)
     assert not what_to_measure_next(close([*FITTED, both])).startswith("Fit")
@@ -385,7 +388,7 @@ def test_runs_at_two_temperatures_that_nobody_shifted_are_to_be_fitted_apart():
     )
     found = result([hot, cold])
     assert what_to_measure_next(found).startswith("Fit runs of one temperature")
-    found.records = [hot, replace(cold, temperature_C=160.0)]
+    vars(found)["records"] = [hot, replace(cold, temperature_C=160.0)]
     assert not what_to_measure_next(found).startswith("Fit runs of one temperature")
 
 
