@@ -261,7 +261,7 @@ def test_a_normal_stress_that_the_law_predicts_is_what_tests_it():
     known["N1"] = replace(known["N1"], stress=100.0)
     vars(found)["records"] = [*FITTED, record("slow", 0.1, 0.05, quantity="N1")]
     assert what_to_measure_next(found) == check
-    found.records, found.stages = FITTED, (replace(law, aliases=("wall_slip",)),)
+    vars(found).update(records=FITTED, stages=(replace(law, aliases=("wall_slip",)),))
     assert what_to_measure_next(found).startswith("To distinguish linear PTT from wall slip")
 
 
