@@ -54,7 +54,7 @@ def errors(answer: AnswerFields) -> list[Errors]:
             measured.append(Row(symbol, one.note, _inside(answer, one), beyond, at))
         if near or far:
             apart = True
-            seen = _NOT_MEASURED if one.inside is None else "tested"
+            seen = _NOT_MEASURED if one.inside is None else ""
             by_law.append(Row(symbol, one.note * bool(near), near or seen, far))
         elif not one.is_known:
             row = Row(symbol, "", one.note or one.missing, None)

@@ -213,7 +213,7 @@ def left_out(answer: AnswerFields, brief: int = 0) -> str:
     if not names or brief > 4:
         return ""
     told = listed(names) if brief < 4 or len(names) == 1 else f"{len(names)} measurement errors"
-    return f"Leave out of simulations: {told} (instrument)."
+    return f"Not part of this law: {told} (instrument)."
 
 
 _OF_FITTED = "Residual of the fitted runs"
@@ -222,14 +222,15 @@ _OF_FITTED = "Residual of the fitted runs"
 def tolerance(answer: AnswerFields, brief: int = 0) -> str:
     """Return whether the tolerance is met, or unless `brief` in how many runs.
 
-    Alone of several quantities that do and do not; empty where `where` says up to which rate.
+    Of several quantities that do and do not, by which; empty where `where` says up to which rate.
     """
     if answer.adequate is None:
         return ""
     over, level = len(_over_tolerance(answer)), f"tolerance {percent_of(answer.tolerance)}"
     each = _unseen(answer)
-    if 0 < sum(one.inside <= answer.tolerance for one in each.values()) < len(each):
-        return level
+    meeting = [symbol for symbol, one in each.items() if one.inside <= answer.tolerance]
+    if 0 < len(meeting) < len(each):
+        return f"{level} met by {listed(meeting)} only"
     if over and answer.met_up_to:
         return ""
     state = "met" if answer.adequate else "missed"
@@ -272,7 +273,8 @@ def usable(answer: AnswerFields) -> tuple[list[str], str]:
     if not implied:
         return tested, ""
     apart = at_most(max(implied.values())).removeprefix("< ")
-    return tested, f"Untested: {listed([*implied])}; equally good laws agree within {apart}."
+    differ_by = f"equally good laws differ by {apart} (no error bound)"
+    return tested, f"Untested: {listed([*implied])}; {differ_by}."
 
 
 def where(answer: AnswerFields) -> str:
@@ -282,7 +284,8 @@ def where(answer: AnswerFields) -> str:
         return ""
     if not quantities or (answer.adequate is False and (answer.size or 0.0) > _USELESS):
         return f"Do not use to predict; fitted in {flows_of(answer.range.flows)}, {place}."
-    use = f"{'If that suffices, use' if _misses(answer) else 'Use'} for {listed(quantities)}"
+    begin = f"If {percent_of(answer.size or 0.0)} suffices, use" if _misses(answer) else "Use"
+    use = f"{begin} for {listed(quantities)}"
     only = " only" * (len(quantities) == 1 and not implied)
     place = _in_part(answer, place) or f", {place}"
     comma = "," * bool(only and not place.startswith(","))

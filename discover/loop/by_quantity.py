@@ -131,7 +131,8 @@ def _by_law(result: LoopFindings, kind: str) -> ExpectedError:
     unused = "measured but not used" if there else None  # no sample of it is sound
     settled = kind != "N1" or normal_stress_settled(result)
     if apart is not None and (apart >= limit or not settled):
-        above = f", above {percent_of(limit)}{' of N1' * (kind == 'N2')}" * (apart >= limit)
+        above = f", laws differ by over {percent_of(limit)}{' of N1' * (kind == 'N2')}"
+        above *= apart >= limit
         missing = "not determined"
         note = ", ".join(filter(None, [missing + above, unused]))
         return ExpectedError(missing=missing, note=note, spread=ends)

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from discover import words
-from discover.answer import Constant
-from discover.answer.modes_in_words import OF_SWEEP, reduced_to
+from discover.answer.modes_in_words import OF_SWEEP, reduced_to, span
 from discover.answer.sentences import A_TRANSIENT, MUCH, SYMBOLS, differ
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
@@ -129,7 +128,7 @@ def _of_sweep(result: LoopFindings) -> str:
     """Return that the sweep is to be repeated where the runs have other moduli or times."""
     for name, one in result.declared_parameters.items():
         if name in OF_SWEEP and not one.is_open and differ(one.ci95, result.tolerance):
-            are = f"{OF_SWEEP[name]} are {Constant(name, one.value, one.ci95).number} ×"
+            are = f"{OF_SWEEP[name]} are {span(one.ci95)} ×"
             return f"Measure sweep and runs on one loading: the runs' {are} the sweep's."
     return ""
 

@@ -57,7 +57,7 @@ def test_behind_a_transducer_that_saturates_the_law_is_found_and_the_bend_suspec
     repeated = tuple(f" ({name}) with a smaller plate or cone." for name in "bc")
     assert clipped.answer.next_test.startswith("Repeat the start-up at ")
     assert clipped.answer.next_test.endswith(repeated)
-    assert "Leave out of simulations: nonlinear transducer (inst" in clipped.answer.headline
+    assert "Not part of this law: nonlinear transducer (inst" in clipped.answer.headline
     # six tenths of the largest stress are shown; a straight line bends between two knots
     assert suspect.constants[0].value == pytest.approx(-0.4, abs=0.05)
     assert clipped.to_json()["free_form"][0]["constants"]["ptt_linear"]["epsilon"]

@@ -18,7 +18,9 @@ MELT = Answer(
     expected_error={
         "sigma12": ExpectedError(0.06, note="2 unseen runs"),
         "N1": ExpectedError(
-            missing="not determined", note="not determined, above 20 %", spread=(0.4, 0.5)
+            missing="not determined",
+            note="not determined, laws differ by over 20 %",
+            spread=(0.4, 0.5),
         ),
     },
     suspects=(Suspect("stress_gain", (Constant("gain_error", -0.11, (-0.36, 0.02)),)),),

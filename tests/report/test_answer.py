@@ -26,8 +26,8 @@ from tensor_library.law_terms import LawTerm
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
         "Linear PTT, ε = 0.82 (95 % CI 0.58–1.07), 2 modes. Mean error of σ12 6 % (95 % CI 4–7 %) "
-        "on 2 unseen runs, worst run 8 %; tolerance 5 % met in 1 of 2 runs. If that suffices, use "
-        "for σ12 only, 0.003–3 1/s. Leave out of simulations: stress gain (instrument)."
+        "on 2 unseen runs, worst run 8 %; tolerance 5 % met in 1 of 2 runs. If 6 % suffices, use "
+        "for σ12 only, 0.003–3 1/s. Not part of this law: stress gain (instrument)."
     )
     falls = headline(falls_above="1 1/s")
     assert "0.003–3 1/s. No steady flow above 1 1/s (falling flow curve)." in falls
@@ -88,7 +88,7 @@ AGREED = ExpectedError(spread=(0.03, 0.04))
 def test_a_law_is_of_use_for_what_the_table_has_a_good_number_of(flows, errors, said):
     answer = replace(MELT, range=replace(MELT.range, flows=flows), expected_error=errors)
     assert f"se for {said}, 0.003–3 1/s" in answer.headline
-    n1 = "Untested: N1; equally good laws agree within 3 %."
+    n1 = "Untested: N1; equally good laws differ by 3 % (no error bound)."
     assert (n1 in answer.headline) is (said == "σ12")
     # what is as good as was asked has no condition
     good = headline(answer, tolerance=0.6)
@@ -103,12 +103,12 @@ def test_what_errors_allow_for_in_the_instrument_is_said_with_them():
     none = replace(MELT, suspects=())
     assert "Leave out" not in none.headline
     two = replace(MELT, suspects=(*MELT.suspects, Suspect("wall_slip")))
-    assert "Leave out of simulations: stress gain and wall slip (instrument)." in two.headline
+    assert "Not part of this law: stress gain and wall slip (instrument)." in two.headline
     many = replace(two, suspects=(*two.suspects, Suspect("edge_fracture")))
     assert "stress gain, wall slip and torque loss with strain (instrument)." in many.headline
     # names give way where words run out, with the table to name them
     long = replace(many, next_test="Measure " + "more and " * 12)
-    assert "Leave out of simulations: 3 measurement errors (instrument)." in long.headline
+    assert "Not part of this law: 3 measurement errors (instrument)." in long.headline
     slow = Suspect("rate_rise_time", (Constant("tau", 0.02, (0.01, 0.03), "s"),))
     assert ": motor response time (instrument)." in replace(MELT, suspects=(slow,)).headline
 
@@ -327,7 +327,7 @@ def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_
     assert said in told
     # met for one of them, as the numbers say
     mixed = replace(MELT, expected_error=errors, tolerance=0.1).headline
-    assert "data: σ12 6 %, uniaxial extension 17 %; tolerance 10 %. Use" in mixed
+    assert "data: σ12 6 %, uniaxial extension 17 %; tolerance 10 % met by σ12 only. Use" in mixed
     both = replace(MELT.range, flows=("shear", "uniaxial"))  # the worst may be either
     told = replace(MELT, expected_error=errors, range=both).headline
     assert "data: σ12 6 %, uniaxial extension 17 %, worst run 8 %; tolerance" in told

@@ -38,7 +38,7 @@ def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate
     assert ((last.note, last.inside) == ("a.csv", "8 %")) is not adequate
     use = answer.to_json()["use"]
     assert use["expected_error"]["N1"] is None
-    told = "not determined, above 20 %: laws that fit as well differ by 40 %"
+    told = "not determined, laws differ by over 20 %: laws that fit as well differ by 40 %"
     assert use["why_unknown"]["N1"] == told
     assert Answer("", instead="No signal.").adequate is None
 
