@@ -3,7 +3,14 @@
 from typing import Any, NamedTuple
 
 from discover.answer.fields import AnswerFields
-from discover.answer.sentences import SYMBOLS, after_noise, at_most, only_quantity, worst_run
+from discover.answer.sentences import (
+    ESTIMATED,
+    SYMBOLS,
+    after_noise,
+    at_most,
+    only_quantity,
+    worst_run,
+)
 from discover.words import percent_of
 
 
@@ -82,9 +89,10 @@ _UNTESTED, _TWICE, _NOT_MEASURED = "Never tested", "at twice the highest rate", 
 
 def _title(answer: AnswerFields) -> str:
     """Return what the errors are, and the noise that they do not hold."""
-    of = "Residual of the fitted runs"
-    if not answer.expected("sigma12").is_residual:
-        of = "Mean error on unseen runs"
+    stress, found = answer.expected("sigma12"), answer.discrepancy
+    of = "Residual of the fitted runs" if stress.is_residual else "Mean error on unseen runs"
+    if stress.inside is None and found is not None and not found.unseen:
+        of = ESTIMATED
     return of + after_noise(answer)
 
 

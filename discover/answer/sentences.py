@@ -154,7 +154,7 @@ def description(answer: AnswerFields, brief: int = 0) -> str:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
         ends = f" ({_LEVEL}{low}–{high} %)" * (low != high and brief < 2)
         # of fitted runs it is no error that a prediction could have
-        said = f"{_OF_FITTED} {percent_of(found.size)}{ends}"
+        said = f"{_OF_FITTED if low == high else ESTIMATED} {percent_of(found.size)}{ends}"
         if found.unseen:
             said = _of_unseen(answer, each, f"{percent_of(found.size)}{ends} on {on}", brief)
     return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
@@ -216,7 +216,8 @@ def left_out(answer: AnswerFields, brief: int = 0) -> str:
     return f"Not part of this law: {told} (instrument)."
 
 
-_OF_FITTED = "Residual of the fitted runs"
+_OF_FITTED, ESTIMATED = "Residual of the fitted runs", "Estimated error of the fitted runs"
+"""What a law leaves of them; and what it may miss, where no run is unseen."""
 
 
 def tolerance(answer: AnswerFields, brief: int = 0) -> str:

@@ -218,7 +218,12 @@ class Posterior:
         Over its size.
         """
         if "missed" not in fit.memory:
-            fit.memory["missed"] = left_out(self.fitter_of(fit), [fit])[0]
+            fitter = self.fitter_of(fit)
+            # no fit predicts the only run: what its own leaves is then the least
+            alone = len(fitter.rows.runs) < 2
+            fit.memory["missed"] = (
+                np.array([fitter.misfit(fit)]) if alone else left_out(fitter, [fit])[0]
+            )
         return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - fit.noise.common**2, 0.0))
 
     @in_one_thread
