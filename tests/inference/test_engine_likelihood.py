@@ -1,6 +1,7 @@
 """Likelihood, priors and mixtures are those of textbooks; what runs of one problem differ by."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import numpy as np
@@ -20,7 +21,7 @@ from discover.inference.engine.closed_forms import integrated_rate
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.noise import LEAST, Noise, NoiseModel
-from discover.inference.engine.posterior import posterior_of
+from discover.inference.engine.posterior import Posterior, posterior_of
 from discover.inference.engine.priors import Deviations, Prior, Priors
 from discover.inference.engine.problem import SCATTER_OF_RUNS, Problem
 from discover.inference.engine.rows import Rows
@@ -318,3 +319,16 @@ def test_a_steady_flow_before_a_record_adds_no_strain_and_every_variable_is_a_nu
     for one in found.values():
         columns = one.columns(problem.fitted.recorded)
         assert np.all(np.isfinite(columns))
+
+
+def test_a_single_run_is_missed_by_what_its_own_fit_leaves_and_of_two_each_without_it(monkeypatch):
+    fit = object.__new__(Fit)
+    fit.memory, fit.noise = {}, Noise(np.ones(1), 0.03, 0.0, 0.0)
+    fitter = SimpleNamespace(rows=SimpleNamespace(runs=["alone"]), misfit=lambda fit: 0.05)
+    found = SimpleNamespace(fitter_of=lambda fit: fitter)
+    without = [np.array([0.034, 0.05])]
+    monkeypatch.setattr("discover.inference.engine.posterior.left_out", lambda *asked: without)
+    assert Posterior.missed(found, fit) == pytest.approx([0.04])  # 0.05² = 0.03² + 0.04²
+    fitter.rows.runs.append("another")
+    fit.memory.clear()
+    assert Posterior.missed(found, fit) == pytest.approx([0.016, 0.04])
