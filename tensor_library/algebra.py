@@ -124,7 +124,16 @@ TENSOR_ORDERS = (0, 1, 1, 2, 2, 2, 3, 3)
 def integrity_basis(
     stress: Symmetric, rate: Symmetric
 ) -> Float[Array, "8 3 3"] | Float[Array, "8 4"]:
-    """Return the `TENSOR_NAMES`, basis of isotropic functions [Smith 1971, IJES 9, 899]."""
+    """Return I, σ, γ̇, σ², γ̇², σγ̇+γ̇σ, σ²γ̇+γ̇σ², σγ̇²+γ̇²σ [Smith 1971, IJES 9, 899].
+
+    Any isotropic symmetric function of two symmetric tensors is a sum of these with coefficients in
+    the ten invariants.
+
+    Examples
+    --------
+    >>> integrity_basis(jnp.zeros(4), jnp.zeros(4)).shape
+    (8, 4)
+    """
     stress_squared, rate_squared = square(stress), square(rate)
     return jnp.stack([
         identity_like(stress), stress, rate, stress_squared, rate_squared,
@@ -149,7 +158,16 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
 
 
 def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
-    """Return L·σ + σ·Lᵀ [Oldroyd 1950] of (3, 3), or of four components with (4,) or () of L."""
+    """Return L·σ + σ·Lᵀ, what the upper-convected derivative subtracts from dσ/dt [Oldroyd 1950].
+
+    `stress`: (3, 3) with a full L, else four components with (4,) or () of L.
+
+    Examples
+    --------
+    >>> stress, rate = jnp.array([0.0, 0.0, 0.0, 3.0]), jnp.asarray(2.0)
+    >>> upper_convected_production(stress, rate).tolist()  # σ11 grows with 2 γ̇ σ12
+    [12.0, 0.0, 0.0, 0.0]
+    """
     velocity_gradient = jnp.asarray(velocity_gradient)
     if velocity_gradient.shape == ():
         zero = jnp.zeros_like(stress[0])

@@ -20,7 +20,11 @@ class ExtensionWarning(UserWarning):
 
 
 class Registry(MutableMapping[str, T]):
-    """Things of one `kind` by name: built in, registered, and of entry points of a `group`."""
+    """Things of one kind by name, in the order in which they became known.
+
+    `kind`: the singular, for messages. `group`: entry points that bring more, such as
+    ``"discover.laws"``. `built_in`: makes those that are always there.
+    """
 
     def __init__(self, kind: str, group: str, built_in: Callable[[], Mapping[str, T]]):
         self.kind, self.group = kind, group

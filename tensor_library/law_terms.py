@@ -79,7 +79,10 @@ class LawTerms:
 
     @classmethod
     def of(cls, terms: Iterable[LawTerm]) -> "LawTerms":
-        """Add terms up; ValueError if one stands twice, or an inner parameter has two values."""
+        """Return the sum of these terms.
+
+        Raises ValueError if a term stands there twice, or an inner parameter has two values.
+        """
         coefficients: dict[str, float] = {}
         inner: dict[str, float] = {}
         for term in terms:

@@ -88,7 +88,11 @@ class Notation:
 def printed(
     expression: Any, letters: Mapping[str, str], printer: Callable[[Any], str]
 ) -> tuple[str, bool]:
-    """Return SymPy's text with `letters` for symbols, and whether it needs brackets as a factor."""
+    """Return an expression as a printer of SymPy writes it, with given texts for its symbols.
+
+    `expression`: over symbols. `letters`: what stands for them, by their names. `printer`: takes an
+    expression and returns text. Returns the text, and whether it needs brackets to be a factor.
+    """
     import sympy
 
     symbols = sorted(expression.free_symbols, key=str)

@@ -153,7 +153,9 @@ class CandidateTerm:
 
 
 def parse_term(name: str) -> CandidateTerm:
-    """Return the term of a canonical spelling, matched, never evaluated; ValueError if it is none.
+    """Return the term with this canonical spelling, which is matched, never evaluated.
+
+    Raises ValueError if the text is none.
 
     Examples
     --------

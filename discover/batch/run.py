@@ -118,7 +118,12 @@ def run_batch(
     seed: int | None = None, overwrite: bool = False,
     progress: Progress = lambda label, fraction: None,
 ) -> BatchResult:  # fmt: skip
-    """Run studies into folders of their own; one that fails does not stop the others."""
+    """Run studies into folders of their own; one that fails does not stop the others.
+
+    A study with ``[loop]`` closes the loop, one with ``[compare]`` or neither compares. With one of
+    `workers` everything happens in this process. Raises InputError if two studies would write to
+    one folder, or `out` cannot be written to.
+    """
     make_folder(out)
     resumable.set()
     if not overwrite:

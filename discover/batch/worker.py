@@ -1,4 +1,7 @@
-"""A process that runs studies for `discover.batch.workers`, by lines of JSON on its two pipes."""
+"""A process that runs one study after the other for `discover.batch.workers`.
+
+Jobs come, and word of them goes, as lines of JSON: there is no port that others could reach.
+"""
 
 import json
 import os
@@ -15,7 +18,11 @@ from discover.report.plots import keep_out_of_the_working_directory
 
 
 def main() -> None:
-    """Run what is asked for until standard input ends, however it does, and then end at once."""
+    """Run what is asked for until standard input ends, and then end at once.
+
+    It ends when the process that asks is gone, however that ended. A study is not waited for: it
+    would keep its folder locked, and what it had finished is kept.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that asks hears Ctrl-C
     use_one_thread_from_the_start()
     keep_out_of_the_working_directory()

@@ -33,7 +33,11 @@ def run_in_workers(
     say: Callable[[int, str, float], None],
     end: Callable[[int, StudyStatus], None],
 ) -> None:
-    """Run jobs side by side; one whose worker dies goes on in another, from its last part."""
+    """Run jobs side by side; one whose worker dies goes to another, and on from its last part.
+
+    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
+    with the position, and how it ended.
+    """
     team = _Team()
     with on_stop(team.stop), ThreadPoolExecutor(workers) as threads:
         try:
@@ -123,7 +127,11 @@ def run_on_cluster(
     run: Callable[..., StudyStatus], jobs: Sequence[Job], scheduler: str,
     say: Callable[[int, str, float], None], end: Callable[[int, StudyStatus], None],
 ) -> None:  # fmt: skip
-    """Run jobs on a dask cluster with the same paths; InputError without dask or a scheduler."""
+    """Run jobs side by side on a dask cluster, whose workers know files by the same paths.
+
+    `say`, `end`: as in `run_in_workers`. Raises InputError if dask is not installed, or no
+    scheduler answers at the address.
+    """
     try:
         from distributed import Client, as_completed
     except ImportError:

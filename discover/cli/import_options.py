@@ -31,9 +31,10 @@ def merge_mapping(
     layout: AnyMapping[str, object], geometry: str | None = None,
     blocks: Sequence[int] | None = None, start_time_s: float | None = None,
 ) -> Mapping:  # fmt: skip
-    """Return the mapping of a file with the options of the command line on top, as typed.
+    """Return the mapping of a file with the options of the command line on top.
 
-    `given`: ``stress=Shear stress``, ``melt.txt:2=creep``, ``40``. InputError if one is wrong.
+    `given`: as ``stress=Shear stress``, ``creep``, ``melt.txt:2=creep``, ``40``, ``melt.txt=313K``.
+    `geometry`: as ``cone_plate:radius_mm=25,angle_deg=1``. Raises InputError if one is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):

@@ -81,7 +81,11 @@ def _cells(index: Table, key: str, column: str) -> Sequence[str]:
 
 
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
-    """Return the rate of the steady flow before each run, in 1/s; None where nothing says it."""
+    """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
+
+    Without a name, a column that begins with ``rate_before`` holds the rates of runs declared to
+    start from a steady flow. Raises InputError as `rates_in`.
+    """
     steady = starts_steady(index)
     if column is not None:
         return rates_in(index, column)

@@ -17,8 +17,9 @@ from tensor_library.law_terms import LawTerm
 class WrittenState:
     """State as SymPy expressions over `tensor_library.isotropic_function.scalars`.
 
-    The scalars are the effect's parameters and levels, ``shear_rate`` (√(½ γ̇:γ̇), in 1/s) and
-    ``shear_stress`` (in Pa, of a shear of that rate that does the same work).
+    The scalars are named as the effect's parameters and levels, ``shear_rate`` (√(½ γ̇:γ̇), in 1/s)
+    and ``shear_stress`` (in Pa, of a shear of that rate that does the same work). `modulus_factor`,
+    `time_factor`: on stress and relaxation time of every mode.
     """
 
     rates: tuple[Any, ...]  # of change of each level, in 1/s, in their order
@@ -105,8 +106,9 @@ class AbstractEffect(ABC):
 class ConstitutiveEffect(AbstractEffect):
     """Effect on the fluid: an extra term in the law of every mode, or a stress beside the modes.
 
-    `explicit_rate`: the term names the rate, and may be ill-posed in fast flow [Leonov 1992, JNNFM
-    42].
+    `explicit_rate`: whether the term names the rate of deformation; such laws can lose their
+    well-posedness in fast deformation [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58,
+    25].
     """
 
     explicit_rate: bool = False
@@ -120,7 +122,11 @@ class ConstitutiveEffect(AbstractEffect):
         return type(self).extra_term is not ConstitutiveEffect.extra_term
 
     def extra_term(self, values: Constants, stress: Symmetric, rate: Symmetric):
-        """Summand of h of one mode, dimensionless, from σ_k/G_k and λ_k γ̇, (3, 3) or (4,)."""
+        """Return what is added to h of one mode, dimensionless.
+
+        `values`: parameters in their order. `stress`, `rate`: σ_k/G_k and λ_k γ̇, both (3, 3) or
+        (4,).
+        """
         del values, rate
         return jnp.zeros_like(stress)
 

@@ -166,7 +166,11 @@ class KnownEffect:
 
 
 def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect, ...]:
-    """Return effects as a study names them, effect → parameter → value or ``"fit"``."""
+    """Return the effects that a study or a program names.
+
+    `written`: effect → parameter → value or ``"fit"``. `where`: the place, for messages. Raises
+    InputError if a name is unknown, a parameter missing, or a value outside its range.
+    """
     if not isinstance(written, Mapping):
         raise InputError(
             f"{where} must name effects with their values, such as "

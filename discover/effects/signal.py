@@ -36,7 +36,12 @@ BEARING_FRICTION = BearingFriction(
 
 
 class EdgeFracture(SignalEffect):
-    """Beyond a total strain, in both directions, the torque shrinks exponentially. Empirical."""
+    """Beyond a strain the sheared area, and with it the torque, shrinks exponentially.
+
+    The strain is the total one, in both directions. Empirical: theory says when an edge breaks
+    [Tanner & Keentok 1983, J. Rheol. 27, 47], experiment that the torque then falls cycle by cycle
+    [Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929].
+    """
 
     takes_numpy = True
 

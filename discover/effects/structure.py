@@ -21,8 +21,10 @@ _DULLAERT = "Dullaert & Mewis 2006, J. Non-Newtonian Fluid Mech. 139, 21"
 class Structure(StateEffect):
     """A structure s, one at rest: ds/dt = (1 − s)/t_b − (X/X_c)^m s/t_b.
 
-    Steady, s is Cross's 1/(1 + (X/X_c)^m) [Cross 1965, J. Colloid Sci. 20, 417]. Parameters: 1/X_c,
-    t_b, m. `broken_by`: X, shear rate or stress. `scales`: what s multiplies, stress or times.
+    In steady flow s = 1/(1 + (X/X_c)^m), Cross's equation   [Cross 1965, J. Colloid Sci. 20, 417;
+    Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147–148, 214]. Parameters: 1/X_c (the
+    amplitude), t_b, m. `broken_by`: X, the shear rate or the stress. `scales`: what s multiplies,
+    the stress or the relaxation times of all modes.
     """
 
     broken_by: Literal["rate", "stress"] = "rate"
@@ -190,7 +192,10 @@ THIXOTROPIC_RELAXATION_TWO_TIMES = TwoStructures(
 
 
 class Thixotropy(StateEffect):
-    """Stress in proportion to a structure s with ds/dt = (1 − s)/t_b − k |γ̇| s."""
+    """Stress in proportion to a structure s with ds/dt = (1 − s)/t_b − k |γ̇| s.
+
+    [Moore 1959, Trans. Br. Ceram. Soc. 58, 470; Mewis & Wagner 2009]
+    """
 
     rest = 1.0
     acts_on_steady_states = True

@@ -240,7 +240,8 @@ def flow_numbers(
 ) -> tuple[float, float]:
     """Return Wi = λ̄ max|γ̇| and De of one flow: λ̄ω in oscillation, else λ̄/T with its length T.
 
-    Times and rates (n,) in s and 1/s, λ̄ in s, ω in rad/s; by default from changes of sign.
+    `times`, `shear_rate` in s and 1/s. `relaxation_time`: λ̄ in s. `frequency`: ω in rad/s where
+    known; otherwise from the changes of sign of the rate.
     """
     length = float(times[-1]) if times[-1] > 0 else 1.0
     if frequency is None:

@@ -32,7 +32,11 @@ of a comparison or a fit."""
 
 
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
-    """Laws in a folder of results, or its JSON file, by name; InputError if there is none."""
+    """Return the laws in a folder of results by name: those of the learners, or the only one.
+
+    `folder`: of ``discover compare``, ``close-loop`` or ``fit``, or its JSON file. Raises
+    InputError if there is no result, it is damaged, or its law cannot be written out.
+    """
     return _laws(*read_result(folder))
 
 

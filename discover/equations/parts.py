@@ -24,7 +24,15 @@ from tensor_library.isotropic_function import IsotropicFunction
 
 @dataclass(frozen=True)
 class NamedPart:
-    """Law by its name, with dimensionless constants once for all modes, or once for each."""
+    """Law by its name, with dimensionless constants once for all modes, or once for each.
+
+    Raises InputError if there is no such law, or a parameter is missing, unknown or out of range.
+
+    Examples
+    --------
+    >>> NamedPart("saramito", ({"yield_strain": 0.3}, {"yield_strain": 0.1})).differing
+    ('yield_strain',)
+    """
 
     law: str  # key of `discover.laws.LAWS`
     constants: tuple[Mapping[str, float], ...]
@@ -246,7 +254,12 @@ def law_parts(law: AbstractConstitutiveLaw) -> LawParts:
 def law_parts_by_mode(
     law: AbstractConstitutiveLaw, by_mode: Mapping[str, Sequence[float]], modes: int
 ) -> LawParts:
-    """Return the parts of a law, constants of each mode by name, or by a one-constant effect."""
+    """Return the parts of a law some constants of which differ from mode to mode.
+
+    `by_mode`: values for each mode, by name of a constant, or of an effect that is a law by itself.
+    Raises InputError as `law_parts`, or if what differs is no constant of a law with a name, or a
+    mode was added.
+    """
     if not by_mode:
         return law_parts(law)
     differing = dict(by_mode)

@@ -104,10 +104,11 @@ class AbstractConstitutiveLaw(eqx.Module):
         return identity_like(stress) + stress
 
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
-        """Return dσ/dt, and that of the variables, all dimensionless.
+        """Return dσ/dt, and that of the variables.
 
-        `stress`: (3, 3) with L of (3, 3); or 11, 22, 33, 12 with the variables behind, with four
-        components of L or the scalar shear rate.
+        `stress`: dimensionless, (3, 3), or 11, 22, 33, 12 with the variables behind.
+        `velocity_gradient`: dimensionless L, (3, 3) for a full stress; four components or the
+        scalar shear rate for four.
         """
         rate = rate_of_deformation(velocity_gradient)
         own = stress_in(stress)

@@ -71,7 +71,10 @@ def differs_by_mode(law: AbstractConstitutiveLaw) -> bool:
 
 
 def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callable[..., Any]:
-    """Return a function of one mode's law and numbers as one of all modes, along an `axis`."""
+    """Return a function of one mode's law and numbers as one of all modes.
+
+    `tree`: a law, or what holds one. `axis`: of the modes, in the numbers and in what is returned.
+    """
     own, shared = apart(tree)
 
     def of_mode(own, *numbers):

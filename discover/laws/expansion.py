@@ -15,7 +15,10 @@ from tensor_library.algebra import Symmetric
 
 
 class LibraryExpansion(AbstractExtendedLaw):
-    """h = Σ cₙ termₙ(σ, γ̇; inner); a zero cₙ leaves a term out without recompiling."""
+    """h = Σ cₙ termₙ(σ, γ̇; inner), over a library of candidate terms.
+
+    `coefficients`: cₙ; a zero leaves a term out without recompiling.
+    """
 
     coefficients: Float[Array, " n"]
     inner: Float[Array, " m"]  # inner parameters in the order of ``library.inner_names``
@@ -41,7 +44,10 @@ class LibraryExpansion(AbstractExtendedLaw):
 def law_of_terms(
     terms: LawTerms, linear_relaxation: bool, base: AbstractConstitutiveLaw | None = None
 ) -> LibraryExpansion:
-    """Law h = Σ c term, added to the extra term of `base`; ValueError for no canonical spelling."""
+    """Return the law h = Σ c term, added to the extra term of `base`.
+
+    Raises ValueError if a spelling is not canonical.
+    """
     library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
     return expansion_of(terms, library, linear_relaxation, base)
 

@@ -48,7 +48,10 @@ class EarlierResult:
 
 
 def result_file(written: str, study_file: Path | None) -> Path:
-    """File of an earlier result's folder; InputError if there is none, or it is unfinished."""
+    """Return the file of an earlier result; InputError if there is none, or it is not finished.
+
+    `written`: the folder, relative to the study file or to the working directory.
+    """
     folders = [Path(written)]
     if study_file is not None:
         folders.insert(0, study_file.parent / written)

@@ -22,8 +22,11 @@ _RESULTS = ("report.html", "comparison.json", "loop.json")
 class RunFolder:
     """The folder that a command writes to, and no other process while the object lives.
 
-    ``state/study.json`` holds fingerprint, completeness and hashes of results; finished parts lie
-    beside it. InputError if it holds another study's results, cannot be written to, or is in use.
+    ``state/study.json`` holds the study's fingerprint, whether it is complete, and the hash of
+    every result; finished parts lie beside it, so that a run that was stopped goes on.
+
+    `overwrite`: forget what is there. Raises InputError if the folder holds another study's
+    results, cannot be written to, or is in use.
     """
 
     def __init__(self, path: str | Path, fingerprint: str, overwrite: bool = False):

@@ -35,7 +35,12 @@ class ImportedFolder:
 
 
 def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
-    """Return the data folder that exports hold, in SI; InputError if none can be understood."""
+    """Return the data folder that exports hold, in SI units.
+
+    Records in time become runs, sweeps and flow curves the tables beside them. Rows without a
+    needed number are dropped and counted. `mapping`: what is known; the rest is found from names,
+    units and numbers. Raises InputError if no file can be understood; else `unread` names such.
+    """
     if not paths:
         raise InputError(
             "No test to import was given. Name one or more exports, or list them under [[source]] "

@@ -62,7 +62,11 @@ class Block:
 
     @classmethod
     def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
-        """Return columns, unit and values (n,) by name, as a block; InputError if they are none."""
+        """Return columns of numbers as a block, as if a file had held them as text.
+
+        `columns`: unit, empty for a pure number, and values of each by its name, all of one shape
+        (n,); nan is an empty cell. Raises InputError if they are none.
+        """
         values = [np.asarray(numbers, dtype=float) for _, numbers in columns.values()]
         if not values or {one.shape for one in values} != {(values[0].size,)}:
             shapes = ", ".join(f"{n}: {v.shape}" for n, v in zip(columns, values, strict=True))

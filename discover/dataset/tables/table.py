@@ -144,7 +144,10 @@ def read_bytes(
     path: Path, name: str, if_missing: str = "Check its path.", largest: int = LARGEST_FILE,
     too_large: str = "Keep fewer samples of it.", is_input: bool = True,
 ) -> bytes:  # fmt: skip
-    """Content of a regular file of at most `largest` bytes; InputError if it is none."""
+    """Return the content of a regular file of reasonable size; InputError if it is none.
+
+    `largest` in bytes. `is_input`: whether a command that reads it must not write over it.
+    """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
         with open(path, "rb", opener=lambda p, flags: os.open(p, flags | _AT_ONCE)) as file:

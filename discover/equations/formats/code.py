@@ -273,7 +273,11 @@ def filled(
     template: str, equation: Equation, notation: CodeNotation, nothing: str,
     constants: str | None = None, indent: str = "    ",
 ) -> str:  # fmt: skip
-    """Fill a template with the law; `constants` of a named law as text, by default a table."""
+    """Return a module: a template with the law in a notation.
+
+    `constants`: of a named law, as text; by default a list with a table for each mode.
+    `indent`: of what stands in functions; empty where nothing does.
+    """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
     lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]

@@ -27,7 +27,10 @@ def law_latex(
     digits: int = 5,
     named: NamedPart | None = None,
 ) -> str:
-    """Dimensionless law, `named` plus terms, as one LaTeX equation, with −σ or without."""
+    """Return a dimensionless law as one LaTeX equation.
+
+    `linear_relaxation`: whether the −σ is there. `named`: a law to whose h the terms are added.
+    """
     sums, defined = _law(terms, linear_relaxation, LatexNotation(digits), named)
     return SEPARATOR.join([" ".join(sums), *defined])
 
@@ -148,7 +151,8 @@ def law_element(
 ) -> str:  # fmt: skip
     """Return the whole law, displayed; each summand is a `math` element, so that lines break.
 
-    `modes`: of a law in Pa and s; 0: dimensionless. `rest`: whether a summand h stands elsewhere.
+    `modes`: how many a law in Pa and s has; 0 for a dimensionless one. `solvent`: whether that has
+    one. `rest`: whether it has a summand h that stands elsewhere.
     """
     notation = DisplayedNotation(modes)
     pieces, defined = _law(terms, linear_relaxation, notation, named, notation.time, rest)
