@@ -152,7 +152,10 @@ def run_batch(
 
 
 def folder_names(paths: Sequence[Path]) -> list[str]:
-    """Return folder names of studies: stems, with folders where these repeat; or InputError."""
+    """Return folder names of studies: stems, with folders where these repeat; or InputError.
+
+    Capitals make no difference; names of the batch's own files get ``study-`` before them.
+    """
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     times = Counter(stem.casefold() for stem in stems)
     names = [

@@ -138,7 +138,8 @@ def relaxation_spectrum(
     """Return the modes, the solvent viscosity and the elastic constant that a sweep supports.
 
     G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k are fitted to the
-    relative misfit; evidence decides on modes, solvent and constant (`ModeSearch`).
+    relative misfit, with times up to a decade beyond the sweep; evidence decides on modes, solvent
+    and constant (`ModeSearch`).
 
     `modes`: their number, that of an elastic constant included. `solvent_viscosity`,
     `elastic_modulus`: in Pa s and Pa where known; ``"fit"`` asks for no evidence. Raises InputError

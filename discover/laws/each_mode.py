@@ -110,7 +110,10 @@ def with_modes(
     before: Float[Array, " k"] | np.ndarray,
     after: Float[Array, " m"] | np.ndarray,
 ) -> AbstractConstitutiveLaw:
-    """Interpolate a law of modes with times `before` to times `after`, in s, linearly in log λ."""
+    """Interpolate a law of modes with times `before` to times `after`, in s, linearly in log λ.
+
+    Beyond the ends constants are those of the end.
+    """
 
     def of_times(part):
         if not isinstance(part, LawOfEachMode):

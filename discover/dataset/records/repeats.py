@@ -137,7 +137,10 @@ def total_strain(run: Run) -> float:
 
 
 def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
-    """Return runs with the strain of those before in `order`, such as start times."""
+    """Return runs with the strain of those before in `order`, such as start times.
+
+    Runs of equal number in the order are parallel.
+    """
     totals = np.array([total_strain(run) for run in runs])
     return tuple(
         replace(run, strain_before=float(np.sum(totals[order < at])))
