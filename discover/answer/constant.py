@@ -110,7 +110,8 @@ class Constant:
         if self.over_modes is not None:
             low, high = (significant(end, 2) for end in self.over_modes)
             small = abs(self.over_modes[0]) < _SMALL * abs(self.over_modes[1])
-            return f"{0 if small else low}–{high}{self._unit}"
+            low = "0" if small else low
+            return f"{low if low == high else f'{low}–{high}'}{self._unit}"
         if (other := self.reciprocal) is not self:
             return other.number
         return f"{self._plain(self.value)}{self._unit}"
@@ -205,6 +206,11 @@ class Constant:
         return f"{self.interval}{self.reciprocal._unit} ({level}best fit {self.number})"
 
     @property
+    def best_fit(self) -> str:
+        """Symbol and value, which goes with the other constants."""
+        return f"{self.symbol} = {self.number}{'' if self.over_modes is None else ' by mode'}"
+
+    @property
     def is_skewed(self) -> bool:
         """Whether the value, the best of all constants together, is near an end of its interval.
 
@@ -224,10 +230,7 @@ class Constant:
 
     @property
     def is_poor(self) -> bool:
-        """Whether it is not determined, or its interval wider than its middle: a factor of three.
-
-        Such a constant has hardly a value, so that no first line gives it one.
-        """
+        """Whether it is not determined, or its interval wider than its middle: a factor of three."""
         if self.determined and not self.has_interval:  # declared, or that of each mode
             return False
         low, high = self.ci95 or (0.0, math.inf)

@@ -4,16 +4,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.answer import modes_in_words as modes
+from discover.answer.constant import Constant
 from discover.answer.fields import AnswerFields
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
 _MOST_WORDS = 60
-# Constants that the first lines name until they are that short (-1: of a sum not even how
-# many), and how brief the rest is
+# How the first lines have constants, and how brief the rest is, until they are that short
+_WITH_INTERVALS, _BEST_FIT, _SOME, _COUNT = range(4)
 _SHORTER = (
-    *((3, 0), (3, 1), (2, 1), (1, 1), (1, 2), (1, 3), (1, 4), (0, 3)),
-    *((-1, brief) for brief in range(2, 6)),
+    *((_WITH_INTERVALS, brief) for brief in range(5)),
+    *((_BEST_FIT, brief) for brief in range(1, 5)),
+    *((_SOME, brief) for brief in range(2, 6)),
+    *((_COUNT, brief) for brief in range(4, 6)),
 )
+_FEW = 3  # Constants that stand for all, where all are too many
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -37,9 +41,14 @@ def first_lines(answer: AnswerFields) -> tuple[str, str]:
     As short as need be: what gives way is in the table. Without a law, what stands in its place.
     """
     told = "", ""
-    for most, brief in _SHORTER:
-        parts = description(answer, brief), answer.failed, where(answer), left_out(answer, brief)
-        told = _law(answer, most), " ".join(filter(None, parts))
+    for form, brief in _SHORTER:
+        parts = (
+            description(answer, brief),
+            answer.failed,
+            where(answer, brief),
+            left_out(answer, brief),
+        )
+        told = _law(answer, form), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
             break
     return told
@@ -53,13 +62,13 @@ def words(text: str) -> int:
     return sum(any(map(str.isalnum, one)) for one in text.split())
 
 
-def _law(answer: AnswerFields, most: int) -> str:
-    """Return the law by name with at most so many of its constants."""
+def _law(answer: AnswerFields, form: int) -> str:
+    """Return the law by name, its constants in a form of `_SHORTER`, and its modes."""
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
-    # of a sum without a name the table has the coefficients; there moduli and times come first
     several = len(answer.modes) > 1
+    # moduli and times of several modes stand in their table, terms of a sum in its equation
     own = [
         one for one in answer.constants
         if not (several and (one.name in _OF_MODES or one.letter.endswith("_+")))
@@ -67,20 +76,13 @@ def _law(answer: AnswerFields, most: int) -> str:
     ]  # fmt: skip
     linear = (*_OF_MODES, "eta_s")
     own = sorted(own, key=lambda one: (one.name in linear) is (answer.law is not None))
-    certain = [one for one in own if not one.is_poor]
-    if any(one.is_poor and one.name in _OF_MODES for one in own):  # a solvent alone is no fluid
-        certain = [one for one in certain if one.name != "eta_s"]
-    named, every = constants(certain[: max(most, 0)]), answer.constants
-    if answer.law is None and len(every) > min(most, len(certain)):  # some alone are no law
-        each = [one.symbol for one in every if one.over_modes is not None]
-        poor = sum(one.is_poor for one in every)
-        count = counted(len(every) - len(each), "constant") + f" ({poor} {POORLY})" * bool(poor)
-        named = [" and ".join([count, *(f"{one} by mode" for one in each)])] * (most >= 0)
-        certain = []
+    named = _constants_as(own, form)
     if several:
         # a solvent, or modes faster than the data: a melt has the one and no other
         and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
-        named.append(f"{len(answer.modes)} modes{' and η_s' * bool(and_viscosity)}")
+        added = sum(modes.is_added(answer, one) for one in answer.modes)
+        among = f" ({added} added)" * bool(added)
+        named.append(f"{len(answer.modes)} modes{among}{' and η_s' * bool(and_viscosity)}")
     elif (
         answer.modes
         and not modes.is_plain(answer)
@@ -92,15 +94,25 @@ def _law(answer: AnswerFields, most: int) -> str:
     for one in answer.constants:
         known = one.name in modes.OF_SWEEP and not one.is_poor
         if known and differ(one.ci95, answer.tolerance):
-            level = "" if any(own.has_interval for own in certain[:most]) else _LEVEL
+            level = "" if form or any(one.has_interval for one in own) else _LEVEL
             named.append(f"the sweep's {modes.OF_SWEEP[one.name]} × {one.measured(level)}")
     if answer.temperature_C is not None and not answer.shift_factors:
         named.append(f"at {modes.degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
 
-POORLY = "poorly determined"
-"""What is said of a constant whose interval is wider than a factor of three."""
+def _constants_as(own: Sequence[Constant], form: int) -> list[str]:
+    """Return constants with intervals, as the set of the best fit, or the first and how many."""
+    if form == _WITH_INTERVALS:
+        return constants(own)
+    most = {_BEST_FIT: len(own), _SOME: _FEW, _COUNT: 0}[form]
+    shown = own[: most + (most == len(own) - 1 > 0)]  # one more has as many words as a count
+    told = [one.best_fit for one in shown]
+    if told and any(one.ci95 is not None for one in shown):
+        told[0] = f"best fit {told[0]}"
+    if more := len(own) - len(shown):
+        told.append(f"{more} more constants" if shown else counted(more, "constant"))
+    return told
 
 
 def constants(several: Sequence[Any]) -> list[str]:
@@ -133,7 +145,7 @@ def description(answer: AnswerFields, brief: int = 0) -> str:
     """Return how well the law describes the runs, and if that is enough.
 
     `brief`: 1 without the worst run, 2 without interval, 3 without whose errors several are and
-    what these lack.
+    what these lack, 4 without a tolerance of which `where` says that it is missed.
     """
     if not answer.title:
         return ""
@@ -141,7 +153,7 @@ def description(answer: AnswerFields, brief: int = 0) -> str:
     most = max((one.inside for one in each.values()), default=1.0)
     (note,) = (one.note for one in each.values()) if len(each) == 1 else ("",)
     on = note if note.partition(" ")[2].startswith("unseen") else "unseen runs"
-    enough = tolerance(answer, brief)
+    enough = tolerance(answer, brief) if brief < 4 or not _misses(answer) else ""
     if answer.fits_to_the_noise and most <= answer.tolerance:
         size = "≤ " * (len(each) > 1) + at_most(most)
         said, enough = f"Mean error {size} on {on}{after_noise(answer)}", ""
@@ -185,7 +197,7 @@ def _of_unseen(answer: AnswerFields, each: Mapping[str, Any], size: str, brief: 
     worst = None if brief or answer.met_up_to else worst_run(answer)
     of_worst = [] if worst is None else [f"worst run {worst[1]}"]
     if len(each) < 2:
-        of = f" of {next(iter(each))}" if each else ""
+        of = f" of {next(iter(each))}" if each and brief < 3 else ""
         return ", ".join([f"Mean error{of} {size}", *of_worst])
     told, in_shear = [], answer.range.flows == ("shear",)
     for symbol, one in each.items():
@@ -207,13 +219,20 @@ def _misses(answer: AnswerFields) -> bool:
 def left_out(answer: AnswerFields, brief: int = 0) -> str:
     """Return what of the instrument is no part of the fluid, and so of no simulation.
 
-    `brief`: from 4 on of several no names, from 5 on nothing: the table has them.
+    `brief`: from 3 on in fewer words, from 4 on of several no names, from 5 on nothing: the table
+    has them.
     """
     names = [effect_title(one.effect) for one in answer.suspects]
     if not names or brief > 4:
         return ""
-    told = listed(names) if brief < 4 or len(names) == 1 else f"{len(names)} measurement errors"
-    return f"Not part of this law: {told} (instrument)."
+    if brief < 3:
+        return f"Not part of this law: {listed(names)} (instrument)."
+    named = brief < 4 or len(names) == 1
+    return (
+        f"Instrument effects: {listed(names)}."
+        if named
+        else f"{len(names)} instrument effects (table)."
+    )
 
 
 _OF_FITTED, ESTIMATED = "Residual of the fitted runs", "Estimated error of the fitted runs"
@@ -231,7 +250,7 @@ def tolerance(answer: AnswerFields, brief: int = 0) -> str:
     each = _unseen(answer)
     meeting = [symbol for symbol, one in each.items() if one.inside <= answer.tolerance]
     if 0 < len(meeting) < len(each):
-        return f"{level} met by {listed(meeting)} only"
+        return level if brief > 2 else f"{level} met by {listed(meeting)} only"
     if over and answer.met_up_to:
         return ""
     state = "met" if answer.adequate else "missed"
@@ -278,8 +297,11 @@ def usable(answer: AnswerFields) -> tuple[list[str], str]:
     return tested, f"Untested: {listed([*implied])}; {differ_by}."
 
 
-def where(answer: AnswerFields) -> str:
-    """Return for what the law may be used, and in which flows; of no use, where it was fitted."""
+def where(answer: AnswerFields, brief: int = 0) -> str:
+    """Return for what the law may be used, and in which flows; of no use, where it was fitted.
+
+    `brief`: from 2 on without why it has no steady flow.
+    """
     place, (quantities, implied) = _place(answer), usable(answer)
     if not place:
         return ""
@@ -290,16 +312,17 @@ def where(answer: AnswerFields) -> str:
     only = " only" * (len(quantities) == 1 and not implied)
     place = _in_part(answer, place) or f", {place}"
     comma = "," * bool(only and not place.startswith(","))
-    said = f"{use}{only}{comma}{place}.", _unsteady(answer), implied
+    said = f"{use}{only}{comma}{place}.", _unsteady(answer, brief), implied
     return " ".join(filter(None, said))
 
 
-def _unsteady(answer: AnswerFields) -> str:
+def _unsteady(answer: AnswerFields, brief: int) -> str:
     """Return from which rate on the law predicts no steady flow; empty where it does at each."""
     temperatures = [*answer.range.by_temperature]
     at = f" at {modes.degrees(temperatures[0])}" if len(temperatures) == 1 else ""
     above = answer.falls_above.removesuffix(at)  # which was said
-    return f"No steady flow above {above} (falling flow curve)." if above else ""
+    why = " (falling flow curve)" * (brief < 2)
+    return f"No steady flow above {above}{why}." if above else ""
 
 
 def _in_part(answer: AnswerFields, place: str) -> str:
@@ -341,7 +364,8 @@ def _place(answer: AnswerFields) -> str:
         if rates := _rates(one):
             return f"{tests}{rates}{reduced}"
         return f"{tests}strains up to {modes.short(one.strain[1])}" if tests and one.strain else ""
-    told = [f"{_rates(own)} at {modes.degrees(at)}" for at, own in one.by_temperature.items()]
+    joint = ", " if len(one.by_temperature) == 1 else " at "
+    told = [f"{_rates(r)}{joint}{modes.degrees(at)}" for at, r in one.by_temperature.items()]
     return tests + (listed(told) if len(told) <= modes.MOST_SHIFTS else f"{told[0]} to {told[-1]}")
 
 

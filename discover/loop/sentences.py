@@ -139,7 +139,7 @@ def _of_unfitted(result: LoopFindings) -> str:
         found = measured(result, kind)
         fitted = any(kind in (r.flow, r.quantity) and not r.held_out for r in result.records)
         if found is not None and (found.inside or 0.0) > result.tolerance and not fitted:
-            first = f"Correct {SYMBOLS[kind]} for {found.uncorrected}, then fit it."
+            first = f"Fit {SYMBOLS[kind]}, corrected for {found.uncorrected}."
             return first if found.uncorrected else f"Fit the recorded {SYMBOLS[kind]} too."
     return ""
 
@@ -223,8 +223,7 @@ def _by_geometry(result: LoopFindings) -> str:
     sizes = {record.name: by_run.get(record.name, float(record.errors[-1])) for record in own}
     worst = max(own, key=lambda record: sizes[record.name], default=None)
     run = "one run" if worst is None else described(worst)
-    after = "if its misfit changes, suspect the instrument, else the law"
-    return f"Repeat {run} with another gap; {after}."
+    return f"Repeat {run} with another gap to separate instrument from model error."
 
 
 def _telling_test(result: LoopFindings) -> str:

@@ -77,8 +77,7 @@ def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is possible."""
     end = "at its physical limit" * one.at_limit
     absent = "may be infinite: equally good laws do without" * one.may_be_absent
-    poor = sentences.POORLY * (one.is_poor and one.determined)
-    return "; ".join(filter(None, [one.said, end, poor, absent]))
+    return "; ".join(filter(None, [one.said, end, absent]))
 
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:

@@ -237,8 +237,8 @@ def test_what_was_measured_comes_before_another_stress_and_what_was_not_fitted_f
     found.discrepancy.by_run.update({"slow": 0.05, "middle": 0.05, "fast": 0.08, "pulled": 0.4})
     told = what_to_measure_next(found)
     assert told == (
-        "Repeat the start-up at 1 1/s (fast) with another gap; if its misfit changes, suspect the "
-        "instrument, else the law."
+        "Repeat the start-up at 1 1/s (fast) with another gap to separate instrument from model "
+        "error."
     )
     # a miss within the noise is none to look into
     assert what_to_measure_next(result(FITTED, noise_floor=0.1)).startswith("Measure N1")
@@ -321,7 +321,7 @@ def test_a_normal_stress_that_runs_recorded_and_no_fit_saw_is_compared():
     told = errors_by_quantity(found)["N1"]
     assert told.inside == 0.4  # constant: no noise of its own, and none of σ12 is subtracted
     assert told.note == "1 run at 0.1 1/s, neither fitted nor corrected for axial compliance"
-    assert what_to_measure_next(found) == "Correct N1 for axial compliance, then fit it."
+    assert what_to_measure_next(found) == "Fit N1, corrected for axial compliance."
     fast = replace(normal, rate=3.0 + normal.rate)
     assert errors_by_quantity(close(FITTED, unfitted=(normal, fast)))["N1"].beyond == 0.4
     # samples that scatter by 0.4 hold nothing else
