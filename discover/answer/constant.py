@@ -230,7 +230,7 @@ class Constant:
 
     @property
     def is_poor(self) -> bool:
-        """Whether it is not determined, or its interval wider than its middle: a factor of three."""
+        """Whether it is not determined, or its interval wider than a factor of three."""
         if self.determined and not self.has_interval:  # declared, or that of each mode
             return False
         low, high = self.ci95 or (0.0, math.inf)

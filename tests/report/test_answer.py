@@ -358,7 +358,8 @@ def test_a_constant_that_differs_from_mode_to_mode_is_a_range_over_them():
     added = Constant("relaxation_mode.G", 100.0, (30.0, 300.0), "Pa", letter="G_+")
     slow = replace(added, name="relaxation_mode.lambda", unit="s", letter=r"\lambda_+")
     linear = replace(MELT, title="linear viscoelastic", constants=(added, slow))
-    assert linear.headline.startswith("Linear viscoelastic, 2 modes (1 added).")  # one alone is no spectrum
+    # one alone is no spectrum
+    assert linear.headline.startswith("Linear viscoelastic, 2 modes (1 added).")
     fit = replace(fit, constants=(added,))
     assert "a sum, 2 modes (1 added)." in fit.headline
     assert origin(fit) == " (1 given, 1 added)"
