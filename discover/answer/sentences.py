@@ -3,21 +3,19 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from discover.answer import law_in_words
 from discover.answer import modes_in_words as modes
-from discover.answer.constant import Constant
 from discover.answer.fields import AnswerFields
-from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
+from discover.words import LEVEL, counted, effect_title, listed, percent_of
 
 _MOST_WORDS = 60
-# How the first lines have constants, and how brief the rest is, until they are that short
-_WITH_INTERVALS, _BEST_FIT, _SOME, _COUNT = range(4)
+# How the law has its constants, and how brief the rest is, until both are that short
 _SHORTER = (
-    *((_WITH_INTERVALS, brief) for brief in range(5)),
-    *((_BEST_FIT, brief) for brief in range(1, 5)),
-    *((_SOME, brief) for brief in range(2, 6)),
-    *((_COUNT, brief) for brief in range(4, 6)),
+    *((law_in_words.WITH_INTERVALS, brief) for brief in range(5)),
+    *((law_in_words.BEST_FIT, brief) for brief in range(1, 5)),
+    *((law_in_words.SOME, brief) for brief in range(2, 6)),
+    *((law_in_words.ONE, brief) for brief in range(4, 6)),
 )
-_FEW = 3  # Constants that stand for all, where all are too many
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -25,7 +23,7 @@ SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial exte
 _USELESS = 0.25  # Relative discrepancy beyond which a law is of no use for any prediction
 
 A_TRANSIENT = (
-    "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
+    "Measure a transient, such as start-up: steady or periodic states alone identify no law."
 )
 """What to measure where nothing but states was."""
 
@@ -48,97 +46,15 @@ def first_lines(answer: AnswerFields) -> tuple[str, str]:
             where(answer, brief),
             left_out(answer, brief),
         )
-        told = _law(answer, form), " ".join(filter(None, parts))
+        told = law_in_words.law(answer, form), " ".join(filter(None, parts))
         if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
             break
     return told
 
 
-_LEVEL = f"{LEVEL} "
-
-
 def words(text: str) -> int:
     """Return how many words a text has; numbers are some, signs are none."""
     return sum(any(map(str.isalnum, one)) for one in text.split())
-
-
-def _law(answer: AnswerFields, form: int) -> str:
-    """Return the law by name, its constants in a form of `_SHORTER`, and its modes."""
-    if not answer.title:
-        return answer.instead
-    title = answer.title[:1].upper() + answer.title[1:]
-    several = len(answer.modes) > 1
-    # moduli and times of several modes stand in their table, terms of a sum in its equation
-    own = [
-        one for one in answer.constants
-        if not (several and (one.name in _OF_MODES or one.letter.endswith("_+")))
-        and not (answer.is_empirical and one.is_term)
-    ]  # fmt: skip
-    linear = (*_OF_MODES, "eta_s")
-    own = sorted(own, key=lambda one: (one.name in linear) is (answer.law is not None))
-    named = _constants_as(own, form)
-    if several:
-        # a solvent, or modes faster than the data: a melt has the one and no other
-        and_viscosity = answer.solvent_viscosity_Pa_s and "η_s" not in (one.symbol for one in own)
-        added = sum(modes.is_added(answer, one) for one in answer.modes)
-        among = f" ({added} added)" * bool(added)
-        named.append(f"{len(answer.modes)} modes{among}{' and η_s' * bool(and_viscosity)}")
-    elif (
-        answer.modes
-        and not modes.is_plain(answer)
-        and [one.name for one in own] in ([], ["eta_s"] * len(named))
-    ):
-        (mode,) = answer.modes
-        time = f"λ = {significant(mode.relaxation_time_s, 3)} s"
-        named = [f"G = {significant(mode.modulus_Pa, 3)} Pa", time, *named]
-    for one in answer.constants:
-        known = one.name in modes.OF_SWEEP and not one.is_poor
-        if known and differ(one.ci95, answer.tolerance):
-            level = "" if form or any(one.has_interval for one in own) else _LEVEL
-            named.append(f"the sweep's {modes.OF_SWEEP[one.name]} × {one.measured(level)}")
-    if answer.temperature_C is not None and not answer.shift_factors:
-        named.append(f"at {modes.degrees(answer.temperature_C)}")
-    return f"{', '.join([title, *named])}."
-
-
-def _constants_as(own: Sequence[Constant], form: int) -> list[str]:
-    """Return constants with intervals, as the set of the best fit, or the first and how many."""
-    if form == _WITH_INTERVALS:
-        return constants(own)
-    most = {_BEST_FIT: len(own), _SOME: _FEW, _COUNT: 0}[form]
-    shown = own[: most + (most == len(own) - 1 > 0)]  # one more has as many words as a count
-    told = [one.best_fit for one in shown]
-    if told and any(one.ci95 is not None for one in shown):
-        told[0] = f"best fit {told[0]}"
-    if more := len(own) - len(shown):
-        told.append(f"{more} more constants" if shown else counted(more, "constant"))
-    return told
-
-
-def constants(several: Sequence[Any]) -> list[str]:
-    """Return constants in words; the first interval says that it is one of 95 %."""
-    first = next((one for one in several if one.has_interval), None)
-    return [one.with_interval(_LEVEL if one is first else "") for one in several]
-
-
-def is_a_set(answer: AnswerFields) -> bool:
-    """Return whether constants go together: one is far from the middle of its interval.
-
-    Intervals are over all laws that fit as well, so that ends of several make no law that does.
-    """
-    fitted = [one for one in answer.constants if one.ci95 is not None]
-    return len(fitted) > 1 and any(
-        one.bound or one.is_skewed or not one.determined for one in fitted
-    )
-
-
-def differ(ci95: Sequence[float] | None, tolerance: float) -> bool:
-    """Return whether the interval of a factor says that it is not one, but for a tolerance."""
-    low, high = ci95 or (1.0, 1.0)
-    return high < 1.0 - tolerance or low > 1.0 + tolerance
-
-
-_OF_MODES = ("modulus_Pa", "relaxation_time_s", *modes.OF_SWEEP)
 
 
 def description(answer: AnswerFields, brief: int = 0) -> str:
@@ -164,7 +80,7 @@ def description(answer: AnswerFields, brief: int = 0) -> str:
         said = "" if answer.error is None else f"{_OF_FITTED} {percent_of(answer.error)}"
     else:
         low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-        ends = f" ({_LEVEL}{low}–{high} %)" * (low != high and brief < 2)
+        ends = f" ({LEVEL} {low}–{high} %)" * (low != high and brief < 2)
         # of fitted runs it is no error that a prediction could have
         said = f"{_OF_FITTED if low == high else ESTIMATED} {percent_of(found.size)}{ends}"
         if found.unseen:
@@ -300,9 +216,10 @@ def usable(answer: AnswerFields) -> tuple[list[str], str]:
 def where(answer: AnswerFields, brief: int = 0) -> str:
     """Return for what the law may be used, and in which flows; of no use, where it was fitted.
 
-    `brief`: from 2 on without why it has no steady flow.
+    `brief`: from 2 on without why it has no steady flow, from 4 on without what nothing tested.
     """
     place, (quantities, implied) = _place(answer), usable(answer)
+    implied *= brief < 4
     if not place:
         return ""
     if not quantities or (answer.adequate is False and (answer.size or 0.0) > _USELESS):

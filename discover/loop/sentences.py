@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from discover import words
+from discover.answer.law_in_words import differ
 from discover.answer.modes_in_words import OF_SWEEP, reduced_to, span
-from discover.answer.sentences import A_TRANSIENT, MUCH, SYMBOLS, differ
+from discover.answer.sentences import A_TRANSIENT, MUCH, SYMBOLS
 from discover.effects.registry import make_effect
 from discover.loop.by_quantity import differing, measured, normal_stress_settled, with_unseen
 from discover.loop.findings import LoopFindings

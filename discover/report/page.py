@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 
 from discover import words
 from discover._version import __version__
-from discover.answer import Constant, sentences
+from discover.answer import Constant, law_in_words, sentences
 from discover.answer import modes_in_words as modes
 from discover.equations.spelling.markup import term_element
 from discover.learners.registry import learner_title
@@ -113,7 +113,10 @@ def _environment() -> Environment:
         quantities=in_words,
     )
     environment.globals.update(
-        answer_sentences=sentences, modes=modes, symbols=words.FIGURE_SYMBOLS
+        answer_sentences=sentences,
+        law_in_words=law_in_words,
+        modes=modes,
+        symbols=words.FIGURE_SYMBOLS,
     )
     return environment
 

@@ -383,7 +383,7 @@ def test_what_gives_way_first_is_what_the_table_has_and_the_best_fit_stays():
     longer = replace(several, next_test="Measure " + "more " * 23)
     assert "k b = 2.0 Pa, t b = 2.0 Pa, 2 more constants, 2 modes." in longer.headline
     longest = replace(several, next_test="Measure " + "more " * 33)
-    assert "5 constants, 2 modes." in longest.headline
+    assert "best fit ε = 0.82, 4 more constants, 2 modes." in longest.headline
     assert longest.headline.endswith("If 6 % suffices, use for σ12 only, 0.003–3 1/s.")
     open_ = replace(others[0], determined=False)
     assert "k b not determined" in headline(constants=(*MELT.constants, open_))
