@@ -25,8 +25,8 @@ def verdict_alone(patch: pytest.MonkeyPatch, *, structure: bool = False) -> None
     """
     from discover.inference.engine.design import NextTests
 
-    patch.setattr("discover.loop.from_posterior.design", lambda *_: NextTests())
-    patch.setattr("discover.loop.from_posterior.spread_of_laws", lambda *_: {})
+    patch.setattr("discover.loop.loop.design", lambda *_: NextTests())
+    patch.setattr("discover.loop.loop.spread_of_laws", lambda *_: {})
     patch.setattr("discover.comparison.run_comparison.exact_twins", lambda *_: [])
     if not structure:
         patch.setattr("discover.comparison.run_comparison.analyse_structure", lambda *_: None)

@@ -12,36 +12,27 @@ from jaxtyping import Float
 from scipy.special import chdtri
 
 from discover.answer import Discrepancy
-from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.effects.registry import spelled_distinctly
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.identify.twins import oil_twin
-from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.noise import STATED_TOO_SMALL
-from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import TORQUE
 from discover.laws import UpperConvectedMaxwell
 from discover.loop import final_model
-from discover.loop.expected_errors import spread_of_laws
-from discover.loop.loop_result import LoopResult
-from discover.loop.measured_rates import instants_found
 from discover.loop.parts import (
     CandidateScore,
     ConstantByMode,
-    LawFit,
     ModeConstant,
     Stage,
     StageParameter,
     end_of_range,
 )
 from discover.loop.path import Path
-from discover.loop.runs import errors_of, why_untested
+from discover.loop.runs import errors_of
 from discover.loop.sentences import EXPLAINED
 from discover.statistics import HALF_BAND
 from discover.statistics.noise.whiteness import fast_noise
-from discover.words import percent_of
 
 _DRAWS = 2000
 _FREE = 3  # Degree of constants that are free in each mode
@@ -262,46 +253,6 @@ class FinishedSearch(Path):
             found.append(tuple(scores))
         return tuple(found)
 
-    def remaining(self, spikes: Mapping[str, Sequence[float]], of_rates: str) -> dict[str, Any]:
-        """Return what is left, as the contract names it."""
-        problem, fit = self.posterior.problem, self.fit
-        rows = problem.fitted
-        worst = max(self.records, key=lambda record: float(record.errors[-1]))
-        bounds = self.bounds
-        held = () if problem.predicted is None else problem.predicted.runs
-        first = problem.model.instants.start
-        told = {first + s.place for run in rows.runs for s in run.rate_steps if s.place is not None}
-        instants = {at: ends for at, ends in bounds.items() if at in told}
-        structured = self.verdict == "unexplained"
-        said = f"{of_rates}. " * bool(of_rates)
-        return {
-            "structured": structured,
-            "error": errors_of(self.records, -1).fit,
-            "noise_floor": self.noise,
-            "outliers": sum(map(len, spikes.values())),
-            "outlier_times_s": spikes,
-            "without_fluid": self.without_fluid,
-            "untested": why_untested(self._constants, rows.runs, held),
-            "linear_error": problem.declared.linear_error,
-            "autocorrelation": fit.noise.correlation,
-            "worst_run": worst.name,
-            "worst_run_error": float(worst.errors[-1]),
-            "oil_twin": self.oil_twin,
-            "bench": self._bench(),
-            "description": said + self._in_words(),
-            "step_instants": {}
-            if not problem.declared.step_instants
-            else instants_found(problem.model, self.held_out_theta(fit), instants, rows.runs, held),
-            **self._loadings(),
-        }
-
-    @property
-    def _constants(self) -> int:
-        """How many constants were fitted, those of the declared model counted as one."""
-        model = self.posterior.problem.model
-        added = sum(len(model.positions(name)) for name in self.fit.names)
-        return max(added, int(bool(model.declared.free_constants)))
-
     @property
     def noise(self) -> float:
         """Relative noise, mean over the fitted runs.
@@ -319,15 +270,6 @@ class FinishedSearch(Path):
             sizes = fast_noise(left, sizes)
         return float(np.mean(sizes))
 
-    def _in_words(self) -> str:
-        none = percent_of(self.posterior.unexplained)
-        if self.without_fluid:
-            return "Noise and instrument errors alone explain the data as well."
-        text = f"Probability that an unknown effect is present: {none}."
-        if self.verdict == "unexplained":
-            text = f"An effect is still missing or has another form. {text}"
-        return text
-
     @cached_property
     def oil_twin(self) -> dict[str, float] | None:
         """Return the oil behind a slow motor that records the same; None where none does."""
@@ -344,90 +286,3 @@ class FinishedSearch(Path):
             return None
         mode = float(fluid.modulus[0]), float(fluid.relaxation_time[0])
         return oil_twin(*mode, float(fluid.solvent_viscosity), problem.fitted.runs)
-
-    def _bench(self) -> dict[str, float]:
-        """Return by how much a sound bench is off here, as fitted jointly: its nuisances."""
-        problem, fit = self.posterior.problem, self.fit
-        names = ["stress" if one == TORQUE else one for one in problem.transducers]
-        found = {f"{name}_gain": float(g) for name, g in zip(names, fit.linear, strict=False)}
-        if 1 not in problem.declared.free_positions:
-            found["clock"] = float(fit.theta[1])
-        for nuisance in NUISANCES:
-            at = problem.model.positions(nuisance.effect)[0]
-            if at in fit.priors and nuisance.effect not in fit.names:
-                found[nuisance.effect] = float(fit.theta[at])
-        return found
-
-    def _loadings(self) -> dict[str, Any]:
-        """Return the factors of loadings by run, where each run is a loading of its own."""
-        problem, fit = self.posterior.problem, self.fit
-        if not problem.loads_anew:
-            return {}
-        runs = problem.fitted.runs
-        first = self.posterior.search.fitter.errors.of_runs.stop - len(runs)
-        assert fit.covariance is not None
-        spread = np.sqrt(np.diag(fit.covariance))[len(fit.priors) :]
-        found = {}
-        for i, run in enumerate(runs):
-            factor, half = 1.0 + float(fit.linear[first + i]), 1.96 * float(spread[first + i])
-            found[run.name] = {
-                "factor": factor, "ci95": [factor - half, factor + half], "held_out": False,
-            }  # fmt: skip
-        return {"loading_deviation": problem.loading, "loading": found}
-
-
-def result_of(
-    ended: FinishedSearch,
-    laws: tuple[LawFit, ...],
-    spikes: Mapping[str, Sequence[float]],
-    of_rates: str,
-    unfitted: Sequence[Run] = (),
-) -> LoopResult:
-    """Return the result of a loop; `spikes`, `of_rates`, `unfitted` as `Task` has them.
-
-    `laws`: those that the declared one was chosen from.
-    """
-    problem, theta = ended.posterior.problem, ended.theta
-    declared, model, by_mode = problem.declared, problem.model, ended.by_mode
-    present = [*ended.fit.names, *(known.name for known in declared.effects)]
-    fluid = final_model.augmented_fluid(model, theta, present)
-    states = final_model.states_of(model, theta, present)
-    whole = bool(by_mode) or states != ()
-    own = final_model.declared_parameters(declared, theta, ended.bounds)
-    of_law = {name: one for name, one in by_mode.items() if name in own}
-    # only what is fitted of a known effect has an interval
-    free = {at: ends for at, ends in ended.bounds.items() if at in model.free_positions}
-    stages = ended.stages()
-    tests = NextTests()
-    if not ended.without_fluid:
-        with np.errstate(invalid="ignore"):  # laws that diverge in a test
-            tests = design(ended.posterior)
-    spread = {} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit)
-    if ended.oil_twin and "N1" in spread:  # of which an oil has none
-        spread["N1"] = replace(spread["N1"], inside=1.0, beyond=1.0)
-    return LoopResult(
-        verdict=ended.verdict,
-        error_before=errors_of(ended.records, 0),
-        error_after=errors_of(ended.records, -1),
-        noise_floor=ended.noise,
-        stages=stages,
-        remaining=ended.remaining(spikes, of_rates),
-        rankings=ended.rankings(),
-        records=tuple(ended.records),
-        unfitted=() if ended.without_fluid else tuple(ended.records_of_unfitted(unfitted)),
-        declared_parameters=own | of_law,
-        declared_effects=final_model.declared_effects(model, theta, free, by_mode),
-        declared_law=final_model.declared_law(declared, theta, of_law),
-        explanations=ended.explanations,
-        next_tests=tests,
-        laws=laws,
-        free_form=tuple(ended.curves),
-        discrepancy=ended.discrepancy,
-        spread_of_laws=spread,
-        left_out=ended.left_out,
-        corrections=ended.corrections(),
-        nearest_law=ended.posterior.memory.get("named"),
-        fluid=None if whole else fluid,
-        fluid_at_mean=fluid if whole else None,
-        states=states or (),
-    )

@@ -14,16 +14,21 @@ from discover.effects import AbstractEffect, ConstitutiveEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.inference.engine import Posterior
+from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.free_form import FreeForm
 from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.posterior import posterior_of
 from discover.inference.engine.search import Search
-from discover.loop.from_posterior import FinishedSearch, result_of
+from discover.loop import final_model
+from discover.loop.expected_errors import spread_of_laws
+from discover.loop.from_posterior import FinishedSearch
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Fold
 from discover.loop.preference import with_function_first, with_named_law_first
+from discover.loop.remaining import remaining
+from discover.loop.runs import errors_of
 from discover.loop.search_time import SearchTime
 from discover.loop.simple import simple_material_result
 from discover.loop.task import Task
@@ -227,8 +232,50 @@ class SearchOutcome:
     def result(self, explanations: int = MOST_LISTED) -> LoopResult:
         """Return the result of a closed loop."""
         task, ended = self.task, self.ended(explanations)
-        lines = task.lines(self.tried) if self.tried else ()
-        return result_of(ended, lines, task.spikes, task.of_rates, task.unfitted)
+        problem, theta = ended.posterior.problem, ended.theta
+        declared, model, by_mode = problem.declared, problem.model, ended.by_mode
+        present = [*ended.fit.names, *(known.name for known in declared.effects)]
+        fluid = final_model.augmented_fluid(model, theta, present)
+        states = final_model.states_of(model, theta, present)
+        whole = bool(by_mode) or states != ()
+        own = final_model.declared_parameters(declared, theta, ended.bounds)
+        of_law = {name: one for name, one in by_mode.items() if name in own}
+        # only what is fitted of a known effect has an interval
+        free = {at: ends for at, ends in ended.bounds.items() if at in model.free_positions}
+        stages = ended.stages()
+        tests = NextTests()
+        if not ended.without_fluid:
+            with np.errstate(invalid="ignore"):  # laws that diverge in a test
+                tests = design(ended.posterior)
+        spread = {} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit)
+        if ended.oil_twin and "N1" in spread:  # of which an oil has none
+            spread["N1"] = replace(spread["N1"], inside=1.0, beyond=1.0)
+        return LoopResult(
+            verdict=ended.verdict,
+            error_before=errors_of(ended.records, 0),
+            error_after=errors_of(ended.records, -1),
+            noise_floor=ended.noise,
+            stages=stages,
+            remaining=remaining(ended, task.spikes, task.of_rates),
+            rankings=ended.rankings(),
+            records=tuple(ended.records),
+            unfitted=() if ended.without_fluid else tuple(ended.records_of_unfitted(task.unfitted)),
+            declared_parameters=own | of_law,
+            declared_effects=final_model.declared_effects(model, theta, free, by_mode),
+            declared_law=final_model.declared_law(declared, theta, of_law),
+            explanations=ended.explanations,
+            next_tests=tests,
+            laws=task.lines(self.tried) if self.tried else (),
+            free_form=tuple(ended.curves),
+            discrepancy=ended.discrepancy,
+            spread_of_laws=spread,
+            left_out=ended.left_out,
+            corrections=ended.corrections(),
+            nearest_law=ended.posterior.memory.get("named"),
+            fluid=None if whole else fluid,
+            fluid_at_mean=fluid if whole else None,
+            states=states or (),
+        )
 
 
 def search(task: Task, laws: Sequence[str] = ()) -> SearchOutcome:

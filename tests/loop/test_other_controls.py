@@ -285,7 +285,7 @@ def test_recorded_n1_that_no_fit_saw_has_an_error_of_its_own():
     wrong = looped(*(with_normal(name, rate, 0.5) for name, rate in (("slow", 0.3), ("fast", 1.2))))
     assert wrong.answer.expected("N1").inside == pytest.approx(1.0, rel=0.05)
     assert wrong.verdict == result.verdict  # no judgement of σ12 knows of it
-    assert wrong.answer.next_test.startswith("Correct N1 for axial compliance, then fit it")
+    assert wrong.answer.next_test.startswith("Fit N1, corrected for axial compliance")
 
 
 def test_a_law_is_used_and_exported_at_the_temperature_of_the_runs(tmp_path):

@@ -20,12 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
-from scipy.ndimage import uniform_filter1d
 from scipy.special import logsumexp
 
 from discover.inference.engine.fits import LOG_2PI, Fit, Fitter
 from discover.inference.engine.noise import LEAST, Noise
-from discover.inference.engine.rows import Rows
+from discover.inference.engine.smooth_curves import MODES, cosines, half_of, spectrum_of
 
 CURVES = (0.3, 0.7, 2.0, 6.0, 18.0, 60.0)
 """Sizes of d over the noise."""
@@ -47,21 +46,11 @@ in which they differ by more is one of no sound bench, and the discrepancy is th
 _SEEN = 1e-5
 """Length of a direction of the unused terms, over the records, down to which it is seen."""
 
-_MODES = 20
-_AFTER_A_STEP = 10.0
-"""Samples of a run over those that the logarithm leaves as they are."""
-
 _TRANSIENT = 0.2
 """Prior share of discrepancies that follow steps of the rate and nothing else."""
 
 _SHARED = 0.2
 """Prior share of discrepancies that are one curve in all runs."""
-
-_ALONE = 3
-"""Samples over which a transient is taken: one that is off alone is a knock, and no transient."""
-
-_STEP = 0.3
-"""Of the largest rate, by which it changes from one sample to the next where it steps."""
 
 _THIRD = 1.0 / 3.0
 
@@ -148,7 +137,7 @@ class DiscrepancyModel:
         self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
         # over the values predicted: those recorded would bring their noise, which it explains then
-        self._curves = _cosines(rows) * rows.sizes_of(self.record)[:, None]
+        self._curves = cosines(rows) * rows.sizes_of(self.record)[:, None]
         curves = [
             *product(CURVES, STIFFNESS, GROWTHS),
             *product(CURVES, STIFFNESS[-1:], GROWTHS[:1], (True,)),
@@ -210,7 +199,7 @@ class DiscrepancyModel:
             both = np.column_stack([self.left, self.columns, self._curves])
             white = self.fitter.noise.whitened(both, self.record, noise)
             run = self.fitter.rows.run[self.fitter.noise.kept]
-            plain, cross, inner, width = [], [], [], 2 * _MODES
+            plain, cross, inner, width = [], [], [], 2 * MODES
             for i in range(len(self.growth)):
                 own, curve = white[run == i, :-width], white[run == i, -width:]
                 plain.append(own.T @ own)
@@ -240,7 +229,7 @@ class DiscrepancyModel:
         for curve in self._grid:
             kind = curve._replace(size=1.0, growth=0.0)
             if kind not in kinds:
-                half, spectrum = _half(curve.after_a_step), _spectrum(curve.stiffness)
+                half, spectrum = half_of(curve.after_a_step), spectrum_of(curve.stiffness)
                 own, along = inner[:, half, half], cross[:, half]
                 if curve.shared:
                     own, along = (np.sum(one, axis=0)[None] for one in (own, along))
@@ -359,7 +348,7 @@ class DiscrepancyModel:
         """Return draws of the curves of all runs, given constants and terms, in Pa."""
         products, rows = self._products(member.correlation), self.fitter.rows
         curve, out = self._grid[member.which - 1], np.zeros((len(own), len(self.left)))
-        half, spectrum = _half(curve.after_a_step), _spectrum(curve.stiffness)
+        half, spectrum = half_of(curve.after_a_step), spectrum_of(curve.stiffness)
         swings = self._swings(curve)
         for runs in [np.arange(len(swings))] if curve.shared else np.arange(len(swings))[:, None]:
             d, size = swings[runs], len(spectrum)
@@ -389,33 +378,3 @@ def _posterior(
     mean[used] = own * (inverse @ (inverse.T @ (own * gram[1:, 0][used])))
     root[used] = own[:, None] * inverse
     return mean, root
-
-
-def _half(after_a_step: bool) -> slice:
-    """Return which of all curves run along the samples, or after the steps of the rate."""
-    return slice(_MODES, None) if after_a_step else slice(_MODES)
-
-
-def _spectrum(stiffness: float) -> Float[np.ndarray, " k"]:
-    """Return the deviations of cosines whose sum has a root mean square of one."""
-    k = np.arange(_MODES)
-    power = 1.0 / (1.0 + (k / stiffness) ** 4)
-    # a cosine has half of the square of its size, a constant all of it
-    return power / np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
-
-
-def _cosines(rows: Rows) -> Float[np.ndarray, "rows curves"]:
-    """Return cosines along the samples of the run of each row, and after its steps."""
-    out = np.zeros((len(rows), 2 * _MODES))
-    for i, run in enumerate(rows.runs):
-        n, rate = len(run), np.asarray(run.rate, float)
-        steps = np.abs(np.diff(rate, prepend=rate[0])) > _STEP * rows.fastest[i]
-        since = np.arange(n) - np.maximum.accumulate(np.where(steps, np.arange(n), 0)) + 0.5
-        after = np.log1p(_AFTER_A_STEP * since / n) / np.log1p(_AFTER_A_STEP)
-        along, afterwards = (
-            np.cos(np.pi * np.outer(x, np.arange(_MODES)))
-            for x in ((np.arange(n) + 0.5) / n, after)
-        )
-        afterwards = uniform_filter1d(afterwards, _ALONE, axis=0)
-        out[rows.run == i] = np.column_stack([along, afterwards])
-    return out

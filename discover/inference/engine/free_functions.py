@@ -17,7 +17,8 @@ from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeForm, FreeFunction
-from discover.inference.engine.posterior import NEAR, WINDOW, Posterior
+from discover.inference.engine.indistinguishable import NEAR
+from discover.inference.engine.posterior import WINDOW, Posterior
 from discover.inference.engine.problem import TERM_ODDS, Problem
 from discover.inference.engine.search import Search
 from discover.inference.engine.variables import Response, variables

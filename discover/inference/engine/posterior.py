@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
 
-from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_form import FreeFunction
+from discover.inference.engine.indistinguishable import Indistinguishable, indistinguishable
 from discover.inference.engine.left_out import (
     FEWEST_RUNS,
     left_out,
@@ -43,31 +43,10 @@ _MOST = 8
 _WITH_DISCREPANCY = 2
 """So many of the likeliest hypotheses are asked what they leave."""
 
-SAME = 0.3
-"""Root mean square of a difference of predictions over the noise, below which no test of these
-runs can tell two hypotheses apart."""
-
-NEAR = 6.0
-"""Log odds behind the likeliest up to which a set that predicts the same is as good."""
-
-_AS_LIKELY = 1.0
-"""Log odds that are not worth more than a bare mention   [Kass & Raftery 1995, JASA 90, 773]."""
-
-_NAMELESS = 0.5
-"""Share that a term without a law keeps: it is as likely the first of a law nobody wrote down."""
-
 _SIZES = 400
 """Draws of the size of a discrepancy."""
 
 _SEED = 20261128
-
-
-@dataclass(frozen=True)
-class Indistinguishable:
-    """Hypotheses that these records cannot tell apart, the likeliest first."""
-
-    members: tuple[tuple[str, ...], ...]
-    probability: float
 
 
 @dataclass(frozen=True)
@@ -252,7 +231,7 @@ def posterior_of(
         whole.rank(fit) + _log_odds_of_smooth_misfit(whole.fitter, fit) for fit in judged[:1]
     ]
     total = float(np.logaddexp.reduce([*logs, *nothing]))
-    explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
+    explanations, lost = indistinguishable(problem, whole, judged, np.exp(logs - total))
     unexplained = float(np.exp(np.logaddexp.reduce(nothing) - total)) + lost if nothing else 1.0
     # constants and bands are those of the fitted runs
     own = np.array([search.rank(fit) for fit in near])
@@ -358,52 +337,3 @@ def smallest(search: Search, fit: Fit) -> float:
             gain = np.clip(2.0 * (fit.log_likelihood - other.log_likelihood) / count, 0.0, 20.0)
             found.append(float(np.sqrt(np.expm1(gain))))
     return min(found)
-
-
-def _classes(
-    problem: Problem, search: Search, fits: Sequence[Fit], probability: np.ndarray
-) -> tuple[tuple[Indistinguishable, ...], float]:
-    """Return classes of hypotheses with the same predictions, and what nameless terms lose."""
-    fitter, classes = search.fitter, []
-    for fit, p in zip(fits, probability, strict=True):
-        record, rank = fitter.record(fit), search.rank(fit)
-        for one in classes:
-            off = (record - one["record"]) / (one["noise"] * fitter.rows.size)
-            if np.sqrt(np.mean(off**2)) < SAME and rank > one["rank"] - NEAR:
-                one["members"].append((fit.names, rank))
-                one["p"] += p
-                break
-        else:
-            noise = fit.noise.sizes[fitter.rows.run]
-            known = {"record": record, "noise": noise, "rank": rank}
-            classes.append(known | {"members": [(fit.names, rank)], "p": p})
-    found, lost = [], 0.0
-    for one in classes:
-        share = float(one["p"])
-        if all(_has_term(problem, names) for names, _ in one["members"]):
-            lost += (1.0 - _NAMELESS) * share
-            share *= _NAMELESS
-        found.append(Indistinguishable(_without_idle(one["members"]), share))
-    return tuple(sorted(found, key=lambda one: -one.probability)), lost
-
-
-def _without_idle(
-    members: Sequence[tuple[tuple[str, ...], float]],
-) -> tuple[tuple[str, ...], ...]:
-    """Return sets that predict the same, the smallest first, without those that only add to these.
-
-    One that adds an effect stays where it is as likely: what is added may be there.
-    """
-    ranked = [(set(names), names, rank) for names, rank in members]
-    small, large = [], []
-    for own, names, rank in ranked:
-        parts = [other for inner, _, other in ranked if inner < own]
-        if not parts:
-            small.append(names)
-        elif rank > max(parts) - _AS_LIKELY:
-            large.append(names)
-    return (*small, *large)
-
-
-def _has_term(problem: Problem, names: Sequence[str]) -> bool:
-    return any(isinstance(problem.effects[name], LibraryTerm) for name in names)

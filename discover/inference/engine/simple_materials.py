@@ -27,7 +27,8 @@ from discover.inference.engine.closed_forms import (
 )
 from discover.inference.engine.discrepancy import DiscrepancyModel
 from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.posterior import SAME, Posterior
+from discover.inference.engine.indistinguishable import SAME
+from discover.inference.engine.posterior import Posterior
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.problem import LOG_ODDS_OF_NONE
 from discover.processor import in_one_thread
