@@ -23,6 +23,8 @@ from discover.compilation_cache import compiled_share, enable_compilation_cache
 from discover.first_use import enable_x64
 enable_x64(); enable_compilation_cache(sys.argv[1])
 from discover.laws import Fluid, make_law
+from discover.protocols import oscillatory_shear
+from discover.simulate import simulate
 fluid = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
 t = np.linspace(0.0, 2.0, 21)
 found = simulate(fluid, oscillatory_shear(2.0, 1.0), t).components
