@@ -55,7 +55,7 @@ def stopped_at_the_first_computation() -> Iterator[None]:
     bar = "discover.cli.app.progress_bar"
     with (
         patch(bar, lambda quiet: contextlib.nullcontext(report)),
-        patch("discover.inference.engine.rows.make_batch", start),
+        patch("discover.inference.rows.make_batch", start),
     ):
         yield
 

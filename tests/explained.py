@@ -1,9 +1,9 @@
 """The posterior of a problem by a search of the engine, without what commands do around it."""
 
-from discover.inference.engine import Posterior, Problem
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.posterior import posterior_of
-from discover.inference.engine.search import Search
+from discover.inference import Posterior, Problem
+from discover.inference.fits import Fitter
+from discover.inference.posterior import posterior_of
+from discover.inference.search import Search
 
 
 def explain(problem: Problem, most: int = 3) -> Posterior:

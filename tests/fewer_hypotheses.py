@@ -23,7 +23,7 @@ def verdict_alone(patch: pytest.MonkeyPatch, *, structure: bool = False) -> None
 
     And what the flows determine, unless its structure is asked for: a program for each layout.
     """
-    from discover.inference.engine.design import NextTests
+    from discover.inference.design import NextTests
 
     patch.setattr("discover.loop.loop.design", lambda *_: NextTests())
     patch.setattr("discover.loop.loop.spread_of_laws", lambda *_: {})

@@ -4,7 +4,7 @@ from discover.answer.answer import Answer, HasAnswer
 from discover.answer.constant import Constant
 from discover.answer.fields import QUANTITIES, TOLERANCE
 from discover.answer.parts import ExpectedError, Mode, Range, Suspect
-from discover.inference.engine.posterior import Discrepancy
+from discover.inference.posterior import Discrepancy
 
 __all__ = [
     "QUANTITIES",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from discover.effects.base import POWERS_OF_TIME
-from discover.equations.spelling.markup import plain as plain_signs
+from discover.equations.markup import plain as plain_signs
 from discover.words import LEVEL, estimate, interval, readable, significant
 
 Span = tuple[float, float]

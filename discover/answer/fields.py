@@ -7,7 +7,7 @@ from typing import Any
 from discover.answer.constant import Constant
 from discover.answer.parts import ExpectedError, Mode, Range, Suspect
 from discover.equations.equation import Equation
-from discover.inference.engine.posterior import Discrepancy
+from discover.inference.posterior import Discrepancy
 from discover.plain_numbers import plain
 from discover.summary_view import Estimate
 

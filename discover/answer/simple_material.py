@@ -15,8 +15,8 @@ from discover.dataset import Run
 from discover.equations.files import read_result
 from discover.equations.formats.rheotool import DENSITY, viscous_fluid
 from discover.errors import InputError
-from discover.inference.engine.closed_forms import recorded, viscosity
-from discover.inference.engine.simple_materials import SimpleFit, describes
+from discover.inference.closed_forms import recorded, viscosity
+from discover.inference.simple_materials import SimpleFit, describes
 from discover.plain_numbers import json_text
 from discover.words import unknown_name
 

@@ -10,7 +10,7 @@ from discover.comparison.hypotheses import in_flows
 from discover.comparison.known_part import Frame
 from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
 from discover.forward import DeclaredModel
-from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.fits import Fit, Fitter
 from discover.laws import LAWS
 from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import SearchOutcome

@@ -12,10 +12,10 @@ from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, n
 from discover.equations.parts import combined
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.of_fluids import bare_run
-from discover.inference.engine.bands import Predictions
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.posterior import posterior_of
-from discover.inference.engine.rows import Rows
+from discover.inference.bands import Predictions
+from discover.inference.fit import Fit
+from discover.inference.posterior import posterior_of
+from discover.inference.rows import Rows
 from discover.learners.results import RecoveredTerm
 from discover.loop.expected_errors import weighed_laws
 from discover.loop.loop import SearchOutcome, search

@@ -11,8 +11,8 @@ from jaxtyping import Float
 from discover.dataset.mode_search import CLOSELY, ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
-from discover.statistics.noise.noise_model import independent_samples, rms
-from discover.statistics.noise.whiteness import FEWEST_FAST, independence_probability
+from discover.statistics.noise_model import independent_samples, rms
+from discover.statistics.whiteness import FEWEST_FAST, independence_probability
 
 MOST_MODES = 30
 # probability that noise leaves such a misfit, up to which it is taken to be none

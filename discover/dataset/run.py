@@ -17,7 +17,7 @@ from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow, steady_rate_before
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 from discover.summary_view import NotebookView
 from discover.words import counted
 

@@ -10,13 +10,13 @@ from jaxtyping import Real
 from numpy.typing import ArrayLike
 
 from discover.effects.registry import Spelled, spelled_distinctly
-from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
-from discover.equations.spelling.markup import (
+from discover.equations.markup import (
     SEPARATOR,
     extra_term_expression,
     law_element,
     law_latex,
 )
+from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
 from discover.errors import InputError
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.expansion import law_of_terms

@@ -16,8 +16,8 @@ from discover.equations.formats.code import numpy_code, sympy_code
 from discover.equations.formats.in_a_solver import in_a_solver
 from discover.equations.formats.rheotool import rheotool_text
 from discover.equations.formats.ufl import ufl_code
+from discover.equations.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex
 from discover.equations.parts import NamedPart, StatePart
-from discover.equations.spelling.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex
 from discover.errors import InputError
 from discover.plain_numbers import json_text, parse_json
 from discover.validation import Section, validated

@@ -13,11 +13,11 @@ from discover.dataset.run_table import temperature_of
 from discover.errors import InputError
 from discover.fitting.named_law_fit import NamedLawFit
 from discover.forward import AugmentedModel
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.posterior import posterior_of
-from discover.inference.engine.problem import Problem
-from discover.inference.engine.search import Search
+from discover.inference.fit import Fit
+from discover.inference.fits import Fitter
+from discover.inference.posterior import posterior_of
+from discover.inference.problem import Problem
+from discover.inference.search import Search
 from discover.laws import LAWS, Fluid, make_law
 from discover.laws.registry import starting_values
 from discover.loop.final_model import augmented_fluid, declared_law

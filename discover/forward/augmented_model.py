@@ -18,7 +18,7 @@ from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Str
 from discover.forward.flows import Batch
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5

@@ -18,7 +18,7 @@ from discover.laws.expansion import expansion_of
 from discover.programs import on_device
 from discover.protocols.kinematics import FlowKind
 from discover.protocols.protocol import FlowProtocol, in_flow, oscillatory_shear, start_up
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 from discover.words import percent_of
 from tensor_library import LawTerms, TermLibrary, parse_term
 

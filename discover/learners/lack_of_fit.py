@@ -9,16 +9,16 @@ import numpy as np
 from discover.dataset.run import Run
 from discover.effects.registry import KnownEffect, built_in_effects
 from discover.forward import DeclaredModel
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.noise import STATED_TOO_SMALL
-from discover.inference.engine.posterior import posterior_of
-from discover.inference.engine.problem import Problem
-from discover.inference.engine.search import Search
+from discover.inference.fits import Fitter
+from discover.inference.noise import STATED_TOO_SMALL
+from discover.inference.posterior import posterior_of
+from discover.inference.problem import Problem
+from discover.inference.search import Search
 from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.laws.expansion import LibraryExpansion, in_shared_form
 from discover.learners.files import kept_in_files
-from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import fast_noise
+from discover.statistics.noise_model import rms
+from discover.statistics.whiteness import fast_noise
 from discover.words import percent_of
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]

@@ -16,7 +16,7 @@ from discover.effects.registry import parameters_of
 from discover.equations import AugmentedLaw, Equation, law_parts
 from discover.equations.formats.rheotool import DENSITY
 from discover.errors import InputError
-from discover.inference.engine.free_form import FreeForm
+from discover.inference.free_form import FreeForm
 from discover.laws.registry import LAWS
 from discover.loop import by_quantity
 from discover.loop.findings import LoopFindings

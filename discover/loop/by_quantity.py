@@ -12,7 +12,7 @@ from discover.loop.findings import LoopFindings
 from discover.loop.fitted_range import as_measured, by_temperature
 from discover.loop.runs import RunRecord
 from discover.protocols.kinematics import MODULI
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 from discover.words import counted, listed, percent_of, significant
 
 BEYOND = 2.0

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.of_fluids import bare_run
-from discover.inference.engine import Posterior
-from discover.inference.engine.bands import LOST, Predictions
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.problem import TERM_ODDS
-from discover.inference.engine.rows import Rows
+from discover.inference import Posterior
+from discover.inference.bands import LOST, Predictions
+from discover.inference.fit import Fit
+from discover.inference.problem import TERM_ODDS
+from discover.inference.rows import Rows
 from discover.loop.by_quantity import BEYOND
 from discover.loop.parts import Spread
 from discover.processor import in_one_thread

@@ -12,8 +12,8 @@ from discover.equations import Equation, StatePart, Tested, law_parts_by_mode
 from discover.equations.equation import box_of, flow_numbers, mean_relaxation_time
 from discover.equations.parts import LawParts
 from discover.errors import InputError
-from discover.inference.engine.design import NextTests
-from discover.inference.engine.free_form import FreeForm
+from discover.inference.design import NextTests
+from discover.inference.free_form import FreeForm
 from discover.laws import Fluid
 from discover.loop import parts
 from discover.loop.runs import RunRecord

@@ -16,8 +16,8 @@ from discover.effects import AbstractEffect
 from discover.effects.registry import spelled_distinctly
 from discover.forward.declared import DEGREE, constants_of_modes
 from discover.identify.twins import oil_twin
-from discover.inference.engine.left_out import FEWEST_RUNS
-from discover.inference.engine.noise import STATED_TOO_SMALL
+from discover.inference.left_out import FEWEST_RUNS
+from discover.inference.noise import STATED_TOO_SMALL
 from discover.laws import UpperConvectedMaxwell
 from discover.loop import final_model
 from discover.loop.parts import (
@@ -32,7 +32,7 @@ from discover.loop.path import Path
 from discover.loop.runs import errors_of
 from discover.loop.sentences import EXPLAINED
 from discover.statistics import HALF_BAND
-from discover.statistics.noise.whiteness import fast_noise
+from discover.statistics.whiteness import fast_noise
 
 _DRAWS = 2000
 _FREE = 3  # Degree of constants that are free in each mode

@@ -13,14 +13,14 @@ from discover.dataset import Dataset
 from discover.effects import AbstractEffect, ConstitutiveEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.inference.engine import Posterior
-from discover.inference.engine.design import NextTests, design
-from discover.inference.engine.discrepancy import DiscrepancyModel
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.free_form import FreeForm
-from discover.inference.engine.free_functions import free_functions
-from discover.inference.engine.posterior import posterior_of
-from discover.inference.engine.search import Search
+from discover.inference import Posterior
+from discover.inference.design import NextTests, design
+from discover.inference.discrepancy import DiscrepancyModel
+from discover.inference.fits import Fitter
+from discover.inference.free_form import FreeForm
+from discover.inference.free_functions import free_functions
+from discover.inference.posterior import posterior_of
+from discover.inference.search import Search
 from discover.loop import final_model
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.from_posterior import FinishedSearch
@@ -54,7 +54,7 @@ def run_loop(
 
     Hypotheses are sets of effects added to the declared model, which is never exact: small
     instrument errors are fitted jointly. All are weighed by evidence and prior, unknown effects
-    among them; see `discover.inference.engine`. Nothing is random.
+    among them; see `discover.inference`. Nothing is random.
 
     `explanations`: how many are listed. `laws`: named laws to choose the declared one from, by the
     fitted runs alone, each with its likeliest further effects. `**asked`: as of `Task.of_runs`.

@@ -16,12 +16,12 @@ from discover.dataset import Run
 from discover.dataset.run_table import wave_of
 from discover.effects import simplest_terms
 from discover.forward import AugmentedModel, DeclaredModel
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.problem import Problem
+from discover.inference.fits import Fitter
+from discover.inference.problem import Problem
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of, steps_between_samples
-from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import independence_probability
+from discover.statistics.noise_model import rms
+from discover.statistics.whiteness import independence_probability
 from discover.words import percent_of
 
 _LEAST = 5e-3  # Scatter over the size of the rate, below which the stress hardly tells it from none

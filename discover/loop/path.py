@@ -10,11 +10,11 @@ from scipy.special import logsumexp
 
 from discover.dataset import Run
 from discover.effects import AbstractEffect
-from discover.inference.engine import Indistinguishable, Posterior
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.free_form import FreeForm
-from discover.inference.engine.rows import Rows
-from discover.inference.engine.search import Search
+from discover.inference import Indistinguishable, Posterior
+from discover.inference.fits import Fit, Fitter
+from discover.inference.free_form import FreeForm
+from discover.inference.rows import Rows
+from discover.inference.search import Search
 from discover.loop.parts import ErrorPair, Explanation, Explanations, Verdict
 from discover.loop.runs import RunRecord, record_runs
 

@@ -16,17 +16,17 @@ from jaxtyping import Float
 from discover.answer.naming import ByMode, named_law
 from discover.equations import Equation, StatePart
 from discover.errors import InputError
-from discover.inference.engine import Posterior
-from discover.inference.engine.discrepancy import DiscrepancyModel
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
-from discover.inference.engine.posterior import smallest
+from discover.inference import Posterior
+from discover.inference.discrepancy import DiscrepancyModel
+from discover.inference.fit import Fit
+from discover.inference.left_out import FEWEST_RUNS, left_out, weights_of
+from discover.inference.posterior import smallest
 from discover.laws import Fluid
 from discover.loop.expected_errors import steady_shear
 from discover.loop.final_model import augmented_fluid, states_of
 from discover.loop.parts import STRUCTURES, NearestLaw, StageParameter
 from discover.processor import in_one_thread
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 from discover.words import percent_of
 
 _MOST = 8  # Laws of each kind with a name, the likeliest, that are fitted without each run

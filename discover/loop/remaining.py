@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import TORQUE
+from discover.inference.problem import NUISANCES
+from discover.inference.rows import TORQUE
 from discover.loop.from_posterior import FinishedSearch
 from discover.loop.measured_rates import instants_found
 from discover.loop.runs import errors_of, why_untested

@@ -17,8 +17,8 @@ from discover.loop.parts import ErrorPair
 from discover.protocols import strains
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
-from discover.statistics.noise.noise_model import independent_samples, rms
-from discover.statistics.noise.whiteness import sample_to_sample_noise
+from discover.statistics.noise_model import independent_samples, rms
+from discover.statistics.whiteness import sample_to_sample_noise
 from discover.words import counted
 
 FEWEST_SAMPLES = 5

@@ -7,15 +7,15 @@ import numpy as np
 from discover.answer.simple_material import SimpleMaterial, material_of
 from discover.dataset import Run
 from discover.forward import make_batch
-from discover.inference.engine.posterior import Posterior
-from discover.inference.engine.problem import Problem
-from discover.inference.engine.simple_materials import simple_material
+from discover.inference.posterior import Posterior
+from discover.inference.problem import Problem
+from discover.inference.simple_materials import simple_material
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage, StageParameter
 from discover.loop.runs import RunRecord, errors_of, record_runs, why_untested
 from discover.loop.task import Task
-from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import sample_to_sample_noise
+from discover.statistics.noise_model import rms
+from discover.statistics.whiteness import sample_to_sample_noise
 from discover.words import significant
 
 # Effect that is all that such a material has; another law stands for itself

@@ -20,10 +20,10 @@ from discover.effects import (
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.forward.declared import may_differ_by_mode
-from discover.inference.engine import Posterior, Problem
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.posterior import occams_window, posterior_of, refitted_to_all_runs
-from discover.inference.engine.search import Search, with_one_constant, without_by_mode
+from discover.inference import Posterior, Problem
+from discover.inference.fits import Fitter
+from discover.inference.posterior import occams_window, posterior_of, refitted_to_all_runs
+from discover.inference.search import Search, with_one_constant, without_by_mode
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.loop.measured_rates import rate_reading_noise, smoothed, with_step_instants

@@ -13,7 +13,7 @@ from discover.answer import modes_in_words as modes
 from discover.answer.error_table import errors
 from discover.effects import StateEffect
 from discover.equations import FORMATS, Equation
-from discover.equations.spelling.markup import law_element
+from discover.equations.markup import law_element
 from discover.errors import InputError
 from discover.plain_numbers import json_text
 from discover.report.mathtext import formula

@@ -28,8 +28,8 @@ from discover.report.plots.loop.runs import (
 )
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.wording import SMALL_FAULTS, free_form_sentence, percent, sentence
-from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import sample_to_sample_noise
+from discover.statistics.noise_model import rms
+from discover.statistics.whiteness import sample_to_sample_noise
 from discover.study.run_folder import RunFolder
 from discover.words import effect_title, listed, significant
 

@@ -6,7 +6,7 @@ import re
 
 from matplotlib.figure import Figure
 
-from discover.equations.spelling.markup import plain
+from discover.equations.markup import plain
 from discover.report.plots.style import INK, Picture, only_settings
 
 _REPLACEMENTS = (

@@ -17,13 +17,13 @@ from discover import words
 from discover._version import __version__
 from discover.answer import Constant, law_in_words, sentences
 from discover.answer import modes_in_words as modes
-from discover.equations.spelling.markup import term_element
+from discover.equations.markup import term_element
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words
 from discover.report import wording
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 

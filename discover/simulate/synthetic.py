@@ -25,7 +25,7 @@ from discover.protocols.protocol import (
     shear_rates,
 )
 from discover.simulate.solve import ShearStress, simulate
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 
 @dataclass(frozen=True, repr=False)

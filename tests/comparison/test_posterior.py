@@ -17,7 +17,7 @@ import discover as dc
 from discover.comparison.hypotheses import terms_of
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
-from discover.inference.engine.fit import Fit
+from discover.inference.fit import Fit
 from discover.loop.loop import SearchOutcome
 from discover.loop.loop_result import LoopResult
 from discover.study import read_study

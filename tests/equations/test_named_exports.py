@@ -37,7 +37,7 @@ from discover.equations import (
     law_parts,
     write_equation,
 )
-from discover.equations.spelling.markup import law_element
+from discover.equations.markup import law_element
 from discover.errors import InputError
 from discover.laws import LAWS, make_law
 from discover.laws.registry import starting_values

@@ -23,7 +23,7 @@ from spelled_laws import (
 
 from discover.comparison.comparison import Comparison
 from discover.equations import Equation, NamedPart, equation_from_json, write_equation
-from discover.equations.spelling.markup import (
+from discover.equations.markup import (
     SEPARATOR,
     law_element,
     law_latex,

@@ -16,7 +16,7 @@ from discover.effects.base import AbstractEffect, EffectParameter, SignalEffect
 from discover.effects.registry import EFFECTS, make_effect, named_effects
 from discover.equations import Equation, equation_from_json, equation_to_json
 from discover.equations.formats.code import numpy_code, sympy_code
-from discover.equations.spelling.markup import law_element
+from discover.equations.markup import law_element
 from discover.errors import InputError
 from discover.laws.base import as_parameter
 from discover.laws.registry import LAWS, name_of

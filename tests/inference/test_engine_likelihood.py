@@ -16,17 +16,17 @@ from scipy.stats import multivariate_normal, multivariate_t, norm
 import discover as dc
 from discover.effects import library_term, make_effect
 from discover.forward import DeclaredModel
-from discover.inference.engine.bands import Predictions, quantiles
-from discover.inference.engine.closed_forms import integrated_rate
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.noise import LEAST, Noise, NoiseModel
-from discover.inference.engine.posterior import Posterior, posterior_of
-from discover.inference.engine.priors import Deviations, Prior, Priors
-from discover.inference.engine.problem import SCATTER_OF_RUNS, Problem
-from discover.inference.engine.rows import Rows
-from discover.inference.engine.search import Search
-from discover.inference.engine.variables import variables
+from discover.inference.bands import Predictions, quantiles
+from discover.inference.closed_forms import integrated_rate
+from discover.inference.fit import Fit
+from discover.inference.fits import Fitter
+from discover.inference.noise import LEAST, Noise, NoiseModel
+from discover.inference.posterior import Posterior, posterior_of
+from discover.inference.priors import Deviations, Prior, Priors
+from discover.inference.problem import SCATTER_OF_RUNS, Problem
+from discover.inference.rows import Rows
+from discover.inference.search import Search
+from discover.inference.variables import variables
 from discover.statistics import HALF_BAND
 from tensor_library.terms import parse_term
 
@@ -327,7 +327,7 @@ def test_a_single_run_is_missed_by_what_its_own_fit_leaves_and_of_two_each_witho
     fitter = SimpleNamespace(rows=SimpleNamespace(runs=["alone"]), misfit=lambda fit: 0.05)
     found = SimpleNamespace(fitter_of=lambda fit: fitter)
     without = [np.array([0.034, 0.05])]
-    monkeypatch.setattr("discover.inference.engine.posterior.left_out", lambda *asked: without)
+    monkeypatch.setattr("discover.inference.posterior.left_out", lambda *asked: without)
     assert Posterior.missed(found, fit) == pytest.approx([0.04])  # 0.05² = 0.03² + 0.04²
     fitter.rows.runs.append("another")
     fit.memory.clear()

@@ -12,10 +12,10 @@ from independent.worlds import MODULUS, TIME, draw_world
 
 import discover as dc
 from discover.forward import DeclaredModel
-from discover.inference.engine import Problem
-from discover.inference.engine.design import design
-from discover.inference.engine.free_functions import free_functions
-from discover.inference.engine.posterior import _log_odds_of_smooth_misfit
+from discover.inference import Problem
+from discover.inference.design import design
+from discover.inference.free_functions import free_functions
+from discover.inference.posterior import _log_odds_of_smooth_misfit
 from discover.loop.runs import split_runs
 from discover.loop.task import candidates_of
 

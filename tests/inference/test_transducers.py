@@ -21,7 +21,7 @@ from vectors import vector_of
 import discover as dc
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.inference.engine import Problem
+from discover.inference import Problem
 from discover.loop.runs import split_runs
 from discover.loop.task import candidates_of
 

@@ -11,7 +11,7 @@ from noisy_runs import start_ups
 
 import discover as dc
 from discover.effects import EffectParameter, SignalEffect, named_effects
-from discover.inference.engine.bands import SIMPLE_FLUIDS
+from discover.inference.bands import SIMPLE_FLUIDS
 
 MODULUS, TIME, EPSILON = 60.0, 1.3, 0.25
 RATES = {"a": 0.7, "b": 1.5, "c": 3.0, "d": 4.5}

@@ -17,9 +17,9 @@ from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DEGREE
-from discover.inference.engine import Problem
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.search import Search, without_by_mode
+from discover.inference import Problem
+from discover.inference.fits import Fitter
+from discover.inference.search import Search, without_by_mode
 from discover.loop import DeclaredModel
 from discover.protocols import in_flow, start_up
 from discover.report.plots.loop.residual import by_mode_picture

@@ -22,9 +22,9 @@ import discover as dc
 from discover.effects import make_effect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.inference.engine import Posterior, Problem
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.left_out import weights_of
+from discover.inference import Posterior, Problem
+from discover.inference.fit import Fit
+from discover.inference.left_out import weights_of
 from discover.loop import run_loop
 from discover.loop.path import Path
 from discover.loop.preference import first_of, is_thixotropic_maxwell, law_of

@@ -12,8 +12,8 @@ import discover as dc
 from discover.answer.simple_material import SimpleMaterial, material_of
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
-from discover.inference.engine.closed_forms import recorded
-from discover.inference.engine.simple_materials import SimpleFit
+from discover.inference.closed_forms import recorded
+from discover.inference.simple_materials import SimpleFit
 from discover.loop import run_loop
 from discover.loop.simple import check_of
 from discover.protocols import imposed_stress, steady_rates

@@ -13,9 +13,9 @@ from discover.answer.naming import named_law
 from discover.answer.sentences import SUSPECTED
 from discover.answer.simple_material import material_of
 from discover.equations import Equation, NamedPart
-from discover.equations.spelling.markup import plain
+from discover.equations.markup import plain
 from discover.errors import InputError
-from discover.inference.engine.simple_materials import SimpleFit
+from discover.inference.simple_materials import SimpleFit
 from discover.loop.parts import STRUCTURES
 from discover.study.schema import Verdict
 from discover.validation import validated

@@ -13,8 +13,8 @@ from discover.answer.modes_in_words import at_use
 from discover.answer.sentences import tolerance
 from discover.effects.registry import named_effects
 from discover.equations import Equation
+from discover.equations.markup import law_element, plain
 from discover.equations.parts import NamedPart, StatePart
-from discover.equations.spelling.markup import law_element, plain
 from discover.loop.answering import rest_of_h
 from discover.report.page import render
 from tensor_library.law_terms import LawTerm

@@ -5,9 +5,8 @@ import pytest
 from independent.noise import correlated, rms
 from scipy.integrate import solve_ivp
 
-from discover.statistics import independent_samples
-from discover.statistics.noise import whiteness
-from discover.statistics.noise.outliers import isolated_outliers
+from discover.statistics import independent_samples, whiteness
+from discover.statistics.outliers import isolated_outliers
 
 
 def test_noise_is_worth_what_its_correlation_leaves_and_a_trend_a_few_samples():

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, without_spikes
 from discover.dataset.run import Run
-from discover.statistics.noise.noise_model import hold_length
+from discover.statistics.noise_model import hold_length
 from discover.summary_view import NotebookView
 from discover.words import counted
 

@@ -16,7 +16,7 @@ from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
 from discover.errors import InputError
 from discover.protocols.kinematics import kinematics_of
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 # Beyond this factor of what elasticity allows, or below zero by half as much, the transducer
 # speaks, not the fluid

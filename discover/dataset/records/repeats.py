@@ -12,8 +12,8 @@ from discover.dataset.run import LARGEST, Run
 from discover.errors import InputError
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
-from discover.statistics.noise.noise_model import rms
-from discover.statistics.noise.whiteness import sample_to_sample_noise
+from discover.statistics.noise_model import rms
+from discover.statistics.whiteness import sample_to_sample_noise
 
 _SAME = 0.02  # relative difference of rates, and of what runs.csv says of two runs, that is none
 _FEWEST_SAMPLES = 10

@@ -9,8 +9,8 @@ from scipy.interpolate import make_lsq_spline
 
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
-from discover.statistics.noise.noise_model import hold_length
-from discover.statistics.noise.outliers import isolated_outliers
+from discover.statistics.noise_model import hold_length
+from discover.statistics.outliers import isolated_outliers
 
 # a record with more samples is thinned: they cost time and say nothing new about a law
 MOST_SAMPLES = 20_000

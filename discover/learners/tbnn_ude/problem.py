@@ -16,7 +16,7 @@ from discover.forward.of_fluids import pieces_in_time
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
 from discover.learners.files import kept_in_files
 from discover.programs import on_device
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 STRAIN_STEP = 0.2
 """Largest strain of a step of the integration."""

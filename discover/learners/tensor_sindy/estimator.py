@@ -8,8 +8,8 @@ import numpy as np
 from pysindy.optimizers import BaseOptimizer
 
 from discover.dataset.run import Run
-from discover.inference.engine.fits import Fitter
-from discover.inference.engine.left_out import left_out
+from discover.inference.fits import Fitter
+from discover.inference.left_out import left_out
 from discover.laws import Fluid
 from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.inference.engine.fits import Fit
+from discover.inference.fits import Fit
 from discover.learners.results import RecoveredTerm
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.learners.tensor_sindy.search import SupportSearch
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 _CLOSE = 5.0
 """Log odds beyond which evidence against a law is very strong   [Kass & Raftery 1995]."""

@@ -9,9 +9,9 @@ from jaxtyping import Float
 from discover.dataset.run import Run
 from discover.effects.library_term import library_term
 from discover.errors import InputError
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.problem import Problem
-from discover.inference.engine.search import Key, Search
+from discover.inference.fits import Fit, Fitter
+from discover.inference.problem import Problem
+from discover.inference.search import Key, Search
 from discover.laws import Fluid
 from discover.learners.lack_of_fit import declared_as
 from discover.learners.settings import ARITHMETIC

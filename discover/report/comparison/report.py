@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from discover.comparison.comparison import Comparison
-from discover.equations.spelling.markup import PREAMBLE, law_latex
+from discover.equations.markup import PREAMBLE, law_latex
 from discover.learners.registry import learner_title
 from discover.plain_numbers import json_text
 from discover.report.comparison import tables

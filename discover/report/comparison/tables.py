@@ -11,7 +11,7 @@ from discover import words
 from discover.comparison import Comparison, LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
-from discover.equations.spelling.markup import law_element, sum_elements
+from discover.equations.markup import law_element, sum_elements
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
 from discover.report.plots.style import learner_colour

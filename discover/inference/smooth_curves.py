@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
-from discover.inference.engine.rows import Rows
+from discover.inference.rows import Rows
 
 MODES = 20
 """Cosines of a curve."""

@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.linear_errors import LinearErrors
-from discover.inference.engine.noise import Noise, NoiseModel
-from discover.inference.engine.priors import Prior, Priors
-from discover.inference.engine.problem import Problem
-from discover.inference.engine.rows import Rows
+from discover.inference.fit import Fit
+from discover.inference.linear_errors import LinearErrors
+from discover.inference.noise import Noise, NoiseModel
+from discover.inference.priors import Prior, Priors
+from discover.inference.problem import Problem
+from discover.inference.rows import Rows
 
 _STEP = 1e-4
 """Of the width of a prior: step of a difference."""

@@ -14,15 +14,15 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects.library_term import LibraryTerm
-from discover.inference.engine.discrepancy import DiscrepancyModel
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.free_form import FreeForm, FreeFunction
-from discover.inference.engine.indistinguishable import NEAR
-from discover.inference.engine.posterior import WINDOW, Posterior
-from discover.inference.engine.problem import TERM_ODDS, Problem
-from discover.inference.engine.search import Search
-from discover.inference.engine.variables import Response, variables
-from discover.inference.engine.with_function import SLIPS, WIDTHS, WithFunction, WithSlip
+from discover.inference.discrepancy import DiscrepancyModel
+from discover.inference.fits import Fit, Fitter
+from discover.inference.free_form import FreeForm, FreeFunction
+from discover.inference.indistinguishable import NEAR
+from discover.inference.posterior import WINDOW, Posterior
+from discover.inference.problem import TERM_ODDS, Problem
+from discover.inference.search import Search
+from discover.inference.variables import Response, variables
+from discover.inference.with_function import SLIPS, WIDTHS, WithFunction, WithSlip
 from discover.processor import in_one_thread
 
 _BASES = 12

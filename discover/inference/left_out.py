@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp, stdtrit
 
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.priors import Priors
+from discover.inference.fits import Fit, Fitter
+from discover.inference.priors import Priors
 from discover.statistics import HALF_BAND
 
 FEWEST_RUNS = 3

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.inference.engine.discrepancy import DiscrepancyModel
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.problem import LOG_ODDS_OF_NONE
-from discover.inference.engine.with_function import WithFunction, WithSlip
+from discover.inference.discrepancy import DiscrepancyModel
+from discover.inference.fit import Fit
+from discover.inference.problem import LOG_ODDS_OF_NONE
+from discover.inference.with_function import WithFunction, WithSlip
 
 _TOLD = 15.0
 """Log odds against all that has a name and any other discrepancy, from which on a curve is shown.

@@ -22,9 +22,9 @@ from jaxtyping import Float
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
-from discover.inference.engine.fits import LOG_2PI, Fit, Fitter
-from discover.inference.engine.noise import LEAST, Noise
-from discover.inference.engine.smooth_curves import MODES, cosines, half_of, spectrum_of
+from discover.inference.fits import LOG_2PI, Fit, Fitter
+from discover.inference.noise import LEAST, Noise
+from discover.inference.smooth_curves import MODES, cosines, half_of, spectrum_of
 
 CURVES = (0.3, 0.7, 2.0, 6.0, 18.0, 60.0)
 """Sizes of d over the noise."""

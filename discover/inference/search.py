@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.priors import Priors
-from discover.inference.engine.problem import Problem
+from discover.inference.fits import Fit, Fitter
+from discover.inference.priors import Priors
+from discover.inference.problem import Problem
 
 _BEAM = 3
 _REFITTED = 8

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from discover.inference.engine.noise import Noise
-from discover.inference.engine.priors import Priors
+from discover.inference.noise import Noise
+from discover.inference.priors import Priors
 from discover.statistics import HALF_BAND
 
 

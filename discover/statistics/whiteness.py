@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.fft import dct
 from scipy.special import gammaincc
 
-from discover.statistics.noise.noise_model import Rows, first_order, rms
+from discover.statistics.noise_model import Rows, first_order, rms
 
 FEWEST_TESTED = 24
 """Samples of a run from which on its noise can be told from a smooth misfit."""

@@ -16,11 +16,11 @@ from discover.effects import (
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel, data_scales
 from discover.forward.declared import LARGEST
-from discover.inference.engine.priors import Prior
-from discover.inference.engine.rows import TORQUE, Rows, transducer_of
-from discover.inference.engine.variables import SLIP_CURVE
+from discover.inference.priors import Prior
+from discover.inference.rows import TORQUE, Rows, transducer_of
+from discover.inference.variables import SLIP_CURVE
 from discover.statistics import root_of
-from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise_model import rms
 
 _TYPICAL = 0.2
 """Of a record, what an effect that is there changes it by: half are smaller, half larger."""

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
-from discover.inference.engine.rows import Rows
+from discover.inference.rows import Rows
 
 CORRELATIONS = (0.0, 0.25, 0.45, 0.6, 0.75, 0.88, 0.95)
 SHARES = (0.0, 0.6, 0.9, 0.985)

@@ -23,7 +23,7 @@ from scipy.integrate import cumulative_trapezoid
 from discover.dataset import Run
 from discover.protocols import strains
 from discover.protocols.kinematics import MODULI
-from discover.statistics.noise.noise_model import first_order
+from discover.statistics.noise_model import first_order
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
 HERSCHEL_BULKLEY, POWER_LAW = "herschel_bulkley", "power_law"

@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from discover.inference.engine.priors import Deviations
-from discover.inference.engine.problem import (
+from discover.inference.priors import Deviations
+from discover.inference.problem import (
     SCATTER_KNOWN,
     SCATTER_OF_RUNS,
     SOUND_GAIN,
     Problem,
 )
-from discover.inference.engine.rows import Rows, transducer_of
+from discover.inference.rows import Rows, transducer_of
 
 _NEXT_TO_NONE = 1e-9
 """Width of what there is none of."""

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.inference.engine.closed_forms import (
+from discover.inference.closed_forms import (
     CARREAU_YASUDA,
     HERSCHEL_BULKLEY,
     KELVIN_VOIGT,
@@ -25,12 +25,12 @@ from discover.inference.engine.closed_forms import (
     recorded,
     strain_of,
 )
-from discover.inference.engine.discrepancy import DiscrepancyModel
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.indistinguishable import SAME
-from discover.inference.engine.posterior import Posterior
-from discover.inference.engine.priors import Prior
-from discover.inference.engine.problem import LOG_ODDS_OF_NONE
+from discover.inference.discrepancy import DiscrepancyModel
+from discover.inference.fits import Fit, Fitter
+from discover.inference.indistinguishable import SAME
+from discover.inference.posterior import Posterior
+from discover.inference.priors import Prior
+from discover.inference.problem import LOG_ODDS_OF_NONE
 from discover.processor import in_one_thread
 from discover.protocols.kinematics import MODULI
 

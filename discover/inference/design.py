@@ -24,9 +24,9 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.forward import make_batch
 from discover.forward.of_fluids import bare_run
-from discover.inference.engine.bands import distinct, moved
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.posterior import Posterior
+from discover.inference.bands import distinct, moved
+from discover.inference.fit import Fit
+from discover.inference.posterior import Posterior
 from discover.protocols import (
     after_steady_flow,
     after_step_strain,
@@ -38,7 +38,7 @@ from discover.protocols import (
     step_rates,
 )
 from discover.protocols.kinematics import FOLLOWED, RecordedQuantity
-from discover.statistics.noise.noise_model import rms, squared_mahalanobis_distance
+from discover.statistics.noise_model import rms, squared_mahalanobis_distance
 
 BEYOND = 3.0
 """How far the slowest and fastest test lie beyond the rates that were fitted."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from discover.effects.library_term import LibraryTerm
-from discover.inference.engine.fits import Fit
-from discover.inference.engine.problem import Problem
-from discover.inference.engine.search import Search
+from discover.inference.fits import Fit
+from discover.inference.problem import Problem
+from discover.inference.search import Search
 
 SAME = 0.3
 """Root mean square of a difference of predictions over the noise, below which no test of these

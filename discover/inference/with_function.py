@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri
 
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.linear_errors import LinearErrors
-from discover.inference.engine.priors import Deviations, Prior
-from discover.inference.engine.rows import Rows
-from discover.inference.engine.variables import (
+from discover.inference.fits import Fit, Fitter
+from discover.inference.linear_errors import LinearErrors
+from discover.inference.priors import Deviations, Prior
+from discover.inference.rows import Rows
+from discover.inference.variables import (
     INNER,
     KNOTS,
     SLIP_CURVE,

@@ -8,23 +8,23 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
 
-from discover.inference.engine.bands import Band, Predictions, quantiles
-from discover.inference.engine.discrepancy import DiscrepancyModel
-from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.free_form import FreeFunction
-from discover.inference.engine.indistinguishable import Indistinguishable, indistinguishable
-from discover.inference.engine.left_out import (
+from discover.inference.bands import Band, Predictions, quantiles
+from discover.inference.discrepancy import DiscrepancyModel
+from discover.inference.fits import Fit, Fitter
+from discover.inference.free_form import FreeFunction
+from discover.inference.indistinguishable import Indistinguishable, indistinguishable
+from discover.inference.left_out import (
     FEWEST_RUNS,
     left_out,
     predictive_mixture,
     screened_to_first_order,
 )
-from discover.inference.engine.noise import LEAST
-from discover.inference.engine.problem import LOG_ODDS_OF_NONE, Problem
-from discover.inference.engine.rows import Rows
-from discover.inference.engine.search import Search, refitted
+from discover.inference.noise import LEAST
+from discover.inference.problem import LOG_ODDS_OF_NONE, Problem
+from discover.inference.rows import Rows
+from discover.inference.search import Search, refitted
 from discover.processor import in_one_thread
-from discover.statistics.noise.whiteness import FEWEST_TESTED, smooth_misfit_probability
+from discover.statistics.whiteness import FEWEST_TESTED, smooth_misfit_probability
 
 _NEGLIGIBLE = 1e-3
 """Probability below which nothing is made of it that none of the hypotheses is all there is."""

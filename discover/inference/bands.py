@@ -10,14 +10,14 @@ from jaxtyping import Bool, Float
 from scipy.special import ndtr, ndtri
 
 from discover.effects import ConstitutiveEffect
-from discover.inference.engine.fit import Fit
-from discover.inference.engine.left_out import MOST_MISSED, next_run_factor
-from discover.inference.engine.noise import deviation
-from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import Rows
-from discover.inference.engine.variables import SLIP_CURVE, Variable
-from discover.inference.engine.with_function import WithFunction
-from discover.statistics.noise.noise_model import rms
+from discover.inference.fit import Fit
+from discover.inference.left_out import MOST_MISSED, next_run_factor
+from discover.inference.noise import deviation
+from discover.inference.problem import NUISANCES
+from discover.inference.rows import Rows
+from discover.inference.variables import SLIP_CURVE, Variable
+from discover.inference.with_function import WithFunction
+from discover.statistics.noise_model import rms
 
 _RUNS_AWAY = 10.0
 """Times the largest stress recorded, or predicted as declared, which no sound law exceeds."""

@@ -10,8 +10,8 @@ from jaxtyping import Float, Int
 
 from discover.dataset import Run
 from discover.effects import EffectParameter, SeriesElement
-from discover.inference.engine.closed_forms import integrated_rate
-from discover.inference.engine.rows import Rows
+from discover.inference.closed_forms import integrated_rate
+from discover.inference.rows import Rows
 
 _LATE = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 _EARLY = (0.0, 0.02, 0.05, 0.1, 0.18, 0.3, 0.45, 0.65, 0.85)

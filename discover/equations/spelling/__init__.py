@@ -1,1 +1,0 @@
-"""Terms spelled as mathematics: LaTeX, MathML, SymPy."""
