@@ -127,9 +127,8 @@ def _of_unseen(answer: AnswerFields, each: Mapping[str, Any], size: str, brief: 
 
 
 def _misses(answer: AnswerFields) -> bool:
-    """Return whether unseen runs miss the tolerance in the mean, and at each rate."""
-    found = answer.discrepancy
-    return bool(answer.adequate is False and found and found.unseen and not found.met_up_to)
+    """Return whether runs miss the tolerance in the mean, and at each rate."""
+    return answer.adequate is False and not answer.met_up_to
 
 
 def left_out(answer: AnswerFields, brief: int = 0) -> str:
@@ -170,8 +169,8 @@ def tolerance(answer: AnswerFields, brief: int = 0) -> str:
     if over and answer.met_up_to:
         return ""
     state = "met" if answer.adequate else "missed"
-    if over and (not brief or answer.adequate):
-        every = len(answer.error_by_run)
+    every = len(answer.error_by_run)
+    if over and every > 1 and (not brief or answer.adequate):
         state = f"met in {every - over or 'none'} of {counted(every, 'run')}"
     return f"{level} {state}"
 
