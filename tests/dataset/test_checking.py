@@ -224,11 +224,12 @@ def test_a_missing_sweep_a_copy_a_file_left_over_an_unused_clock_and_sparse_cycl
     ("index", "told"),
     [
         ("file,temperature_C\nr0.csv,25\nr1.csv,45\n", True),
+        ("file,temperature_C_measured\nr0.csv,25\nr1.csv,45\n", True),
         ("file,temperature_C\nr0.csv,25.2\nr1.csv,24.8\n", False),
         ("file,temperature_C\nr0.csv,25\nr1.csv,\n", False),
         ("file,temperature_C,time_factor\nr0.csv,25,1\nr1.csv,45,3\n", False),
     ],
-    ids=["two temperatures", "one", "one told", "shifted"],
+    ids=["two temperatures", "measured", "one", "one told", "shifted"],
 )
 def test_runs_at_several_temperatures_are_told_unless_their_times_are_shifted(folder, index, told):
     found = check_folder(folder(start_up(), start_up(2.0), runs__csv=index))

@@ -192,8 +192,7 @@ def steady_stress(run: Run) -> float | None:
 
 def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
     """Doubts about runs at several temperatures whose times nobody shifted to one."""
-    told = {run.name: run.metadata.get("temperature_C") for run in runs}
-    known = {name: float(t) for name, t in told.items() if isinstance(t, int | float)}
+    known = {run.name: at for run in runs if (at := run.temperature_C) is not None}
     if known and max(known.values()) - min(known.values()) > _ONE_TEMPERATURE:
         cold, hot = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
         names: dict[str, Any] = {"cold": cold, "hot": hot}
