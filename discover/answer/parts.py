@@ -7,6 +7,8 @@ from typing import Any, Literal
 from discover.answer.constant import Constant, Span
 from discover.words import LEVEL, effect_title, percent_of
 
+_MOST_NAMES = 3  # Names of one effect; of more the rest is counted
+
 
 @dataclass(frozen=True)
 class Mode:
@@ -23,6 +25,16 @@ class Suspect:
     effect: str  # name as studies spell it
     constants: tuple[Constant, ...] = ()  # its constants with their intervals, the amplitude first
     correction: float = 0.0  # by how much it changes a fitted run at most, relative
+    alternatives: tuple[str, ...] = ()  # effects that these runs do not distinguish from it
+
+    @property
+    def title(self) -> str:
+        """Name in words, with those that it may be as well."""
+        first, *others = map(effect_title, (self.effect, *self.alternatives))
+        if len(others) >= _MOST_NAMES:
+            others = [others[0], f"{len(others) - 1} others"]
+        *names, last = first, *others
+        return f"{', '.join(names)} or {last}" if names else last
 
     @property
     def amplitude(self) -> Constant | None:
@@ -37,7 +49,7 @@ class Suspect:
     @property
     def text(self) -> str:
         """Name and amplitude, with its interval."""
-        title, amplitude = effect_title(self.effect), self.amplitude
+        title, amplitude = self.title, self.amplitude
         if amplitude is None:
             return title
         if not amplitude.determined:

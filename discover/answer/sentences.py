@@ -6,7 +6,7 @@ from typing import Any
 from discover.answer import law_in_words
 from discover.answer import modes_in_words as modes
 from discover.answer.fields import AnswerFields
-from discover.words import LEVEL, counted, effect_title, listed, percent_of
+from discover.words import LEVEL, counted, listed, percent_of
 
 _MOST_WORDS = 60
 # How the law has its constants, and how brief the rest is, until both are that short
@@ -137,7 +137,7 @@ def left_out(answer: AnswerFields, brief: int = 0) -> str:
     `brief`: from 3 on in fewer words, from 4 on of several no names, from 5 on nothing: the table
     has them.
     """
-    names = [effect_title(one.effect) for one in answer.suspects]
+    names = [one.title for one in answer.suspects]
     if not names or brief > 4:
         return ""
     if brief < 3:
@@ -330,11 +330,11 @@ def suspects(answer: AnswerFields) -> str:
     if not answer.suspects:
         return ""
     if not answer.fits_to_the_noise and answer.discrepancy and len(answer.discrepancy.by_run) == 1:
-        names = listed([effect_title(one.effect) for one in answer.suspects])
+        names = listed([one.title for one in answer.suspects])
         return f"One run does not tell {names} from what the law lacks."
     if len(answer.suspects) == 1:
         return f"{SUSPECTED}: {answer.suspects[0].text}."
-    names = listed([effect_title(one.effect) for one in answer.suspects])
+    names = listed([one.title for one in answer.suspects])
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 

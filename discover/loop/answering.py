@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
 from discover.answer import Answer, Constant, Mode, Suspect
 from discover.answer import modes_in_words as modes
@@ -20,7 +19,7 @@ from discover.inference.free_form import FreeForm
 from discover.laws.registry import LAWS
 from discover.loop import by_quantity
 from discover.loop.findings import LoopFindings
-from discover.loop.fitted_range import as_measured, range_of
+from discover.loop.fitted_range import as_measured, range_of, shows_recovery
 from discover.loop.parts import STRUCTURES, ConstantByMode, Stage, StageParameter
 from discover.loop.runs import RunRecord
 from discover.loop.sentences import (
@@ -82,7 +81,12 @@ def loop_answer(result: LoopFindings) -> Answer:
         (
             *(_of_function(one) for one in result.free_form if one.in_answer),
             *(
-                Suspect(one.effect, _of_stage(result, one), result.corrections.get(one.effect, 0.0))
+                Suspect(
+                    one.effect,
+                    _of_stage(result, one),
+                    result.corrections.get(one.effect, 0.0),
+                    one.of_instrument,
+                )
                 for one in suspected(result)
             ),
         ),
@@ -212,7 +216,14 @@ def _alternative(result: LoopFindings) -> str:
     own = told.holding([stage.effect for stage in result.stages])
     if result.verdict not in EXPLAINED or own is None:
         return ""
-    if twins := [one for one in own.twins if not set(own.effects) < set(one)]:
+    # what stands in the place of an effect of the instrument is named with it
+    named = [
+        {*own.effects, other} - {one.effect}
+        for one in suspected(result)
+        for other in one.of_instrument
+    ]
+    twins = [one for one in own.twins if not set(own.effects) < set(one) and set(one) not in named]
+    if twins:
         return f"{effects_title(twins[0])} predicts these runs alike."
     if own.probability < _SETTLED:
         others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
@@ -281,23 +292,6 @@ def _law(
     elif name == "ucm" and equation is not None and equation.solvent_viscosity:
         title = "Oldroyd-B"
     return name, title, tuple(_law_first(values, found))
-
-
-def shows_recovery(records: Sequence[RunRecord]) -> bool:
-    """Return whether fitted runs show what recovers: shear that falls to slower shear or to rest.
-
-    A fluid that flow softens is thixotropic if it does   [Mewis & Wagner 2009, Adv. Colloid
-    Interface Sci. 147, 214].
-    """
-    return any(_falls(r.rate) for r in records if r.control == "rate" and not r.held_out)
-
-
-def _falls(rate: Float[np.ndarray, " n"]) -> bool:
-    """Return whether a rate that hardly turns ends, over a tenth of its samples, below half."""
-    last = np.median(rate[-max(len(rate) // 10, 1) :])
-    ways = abs(np.min(rate)), abs(np.max(rate))
-    swings_past = min(ways) if np.min(rate) < 0.0 < np.max(rate) else 0.0  # as a motor does
-    return bool(abs(last) < 0.5 * max(ways) and swings_past < 0.2 * max(ways))
 
 
 def shows_a_derivative(result: LoopFindings) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.answer import Range
 from discover.answer.modes_in_words import degrees
@@ -111,6 +112,23 @@ def _test(record: RunRecord) -> str:
     if one and not before:
         return "start-up"
     return "cessation" if one and record.fastest <= _AT_REST * abs(before) else "steps of rate"
+
+
+def shows_recovery(records: Sequence[RunRecord]) -> bool:
+    """Return whether fitted runs show what recovers: shear that falls to slower shear or to rest.
+
+    A fluid that flow softens is thixotropic if it does   [Mewis & Wagner 2009, Adv. Colloid
+    Interface Sci. 147, 214].
+    """
+    return any(_falls(r.rate) for r in records if r.control == "rate" and not r.held_out)
+
+
+def _falls(rate: Float[np.ndarray, " n"]) -> bool:
+    """Return whether a rate that hardly turns ends, over a tenth of its samples, below half."""
+    last = np.median(rate[-max(len(rate) // 10, 1) :])
+    ways = abs(np.min(rate)), abs(np.max(rate))
+    swings_past = min(ways) if np.min(rate) < 0.0 < np.max(rate) else 0.0  # as a motor does
+    return bool(abs(last) < 0.5 * max(ways) and swings_past < 0.2 * max(ways))
 
 
 def described(record: RunRecord) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from discover.effects.registry import named_effects
 from discover.equations import Equation, equation_to_json
 from discover.laws import LAWS
 
@@ -119,6 +120,12 @@ class Stage:
     source: str
     check: str
     left_open: tuple[str, ...] = field(default=(), kw_only=True)
+
+    @property
+    def of_instrument(self) -> tuple[str, ...]:
+        """Those of `aliases` that are effects of the instrument or of the flow in it."""
+        known = named_effects()
+        return tuple(a for a in self.aliases if a in known and known[a].kind != "constitutive")
 
 
 @dataclass(frozen=True)

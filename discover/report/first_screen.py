@@ -82,7 +82,7 @@ def _said(one: Constant) -> str:
 
 def _suspected(one: Suspect, has_size: bool) -> tuple[str, str, str, str]:
     """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
-    title = words.effect_title(one.effect)
+    title = one.title
     if one.amplitude is None or not has_size:
         return title, "", "" if has_size else sentences.NOT_SEPARABLE, ""
     said = one.amplitude.meaning if one.amplitude.unit == "%" else ""

@@ -151,6 +151,26 @@ def test_every_verdict_is_whole_sentences():
     assert "torque loss" not in following
 
 
+def test_an_effect_of_the_instrument_is_named_with_those_that_these_runs_do_not_distinguish():
+    result = loop_result()
+
+    def answer(aliases, *twins):
+        told = parts.Explanation(("stress_gain",), 0.97, result.error_after, {}, twins)
+        stage = replace(result.stages[0], aliases=aliases)
+        explanations = parts.Explanations((told,), 0.03)
+        return replace(result, stages=(stage,), explanations=explanations).answer
+
+    named = answer(("rate_gain",), ("rate_gain",))
+    assert "Not part of this law: stress gain or rate gain (instrument)." in named.headline
+    assert not named.alternative  # it is said once
+    many = answer(("rate_gain", "time_delay", "stress_drift"))
+    assert "stress gain, rate gain or 2 others (instrument)" in many.headline
+    # one of the fluid is no effect of the instrument, and has a line of its own
+    fluid = answer(("solvent_viscosity",), ("solvent_viscosity",))
+    assert "law: stress gain (instrument)" in fluid.headline
+    assert fluid.alternative == "Newtonian viscosity predicts these runs alike."
+
+
 def test_what_passes_for_slow_noise_is_said_to_look_like_a_slow_effect():
     slow = {**loop_result().remaining, "autocorrelation": 0.9}
     told = "lag-1 correlation 0.9); it is taken for noise, but a slowly varying effect would look"
