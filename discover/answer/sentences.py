@@ -85,6 +85,8 @@ def description(answer: AnswerFields, brief: int = 0) -> str:
         said = f"{_OF_FITTED if low == high else ESTIMATED} {percent_of(found.size)}{ends}"
         if found.unseen:
             said = _of_unseen(answer, each, f"{percent_of(found.size)}{ends} on {on}", brief)
+    if brief > 2 and enough and _meet_alone(answer, each):
+        return f"{said} ({enough})."
     return f"{'; '.join(filter(None, [said, enough]))}." if said else ""
 
 
@@ -126,6 +128,12 @@ def _of_unseen(answer: AnswerFields, each: Mapping[str, Any], size: str, brief: 
     return f"Mean error{data}: {', '.join([*told, *of_worst * (not in_shear)])}"
 
 
+def _meet_alone(answer: AnswerFields, each: Mapping[str, Any]) -> list[str]:
+    """Return the quantities that meet the tolerance, where others do not."""
+    meeting = [symbol for symbol, one in each.items() if one.inside <= answer.tolerance]
+    return meeting if len(meeting) < len(each) else []
+
+
 def _misses(answer: AnswerFields) -> bool:
     """Return whether runs miss the tolerance in the mean, and at each rate."""
     return answer.adequate is False and not answer.met_up_to
@@ -163,8 +171,7 @@ def tolerance(answer: AnswerFields, brief: int = 0) -> str:
         return ""
     over, level = len(_over_tolerance(answer)), f"tolerance {percent_of(answer.tolerance)}"
     each = _unseen(answer)
-    meeting = [symbol for symbol, one in each.items() if one.inside <= answer.tolerance]
-    if 0 < len(meeting) < len(each):
+    if meeting := _meet_alone(answer, each):
         return level if brief > 2 else f"{level} met by {listed(meeting)} only"
     if over and answer.met_up_to:
         return ""

@@ -327,6 +327,9 @@ def test_each_quantity_that_was_measured_has_its_error_in_the_first_line_and_so_
     # met for one of them, as the numbers say
     mixed = replace(MELT, expected_error=errors, tolerance=0.1).headline
     assert "data: σ12 6 %, uniaxial extension 17 %; tolerance 10 % met by σ12 only. Use" in mixed
+    long = "Measure " + "more " * 30  # in few words it stands with the numbers
+    few = replace(MELT, expected_error=errors, tolerance=0.1, next_test=long).headline
+    assert "Mean error: σ12 6 %, uniaxial extension 17 % (tolerance 10 %)." in few
     both = replace(MELT.range, flows=("shear", "uniaxial"))  # the worst may be either
     told = replace(MELT, expected_error=errors, range=both).headline
     assert "data: σ12 6 %, uniaxial extension 17 %, worst run 8 %; tolerance" in told
