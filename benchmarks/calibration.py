@@ -9,7 +9,7 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
   that claims one.
 
 Seeds of 1 to 9 are for development. Seeds that judge are written down before their first case is
-run, and never used to change anything: 20261130, then 20261206 to 20261242, each since a change of
+run, and never used to change anything: 20261130, then 20261206 to 20261243, each since a change of
 the engine (`docs/evidence.md`); answers are in `judged/` by question and seed.
 """
 

@@ -26,7 +26,7 @@ _NAMELESS = 0.5
 
 @dataclass(frozen=True)
 class Indistinguishable:
-    """Hypotheses that these records cannot tell apart, the likeliest first."""
+    """Hypotheses that these records cannot tell apart: with a name, then the likeliest first."""
 
     members: tuple[tuple[str, ...], ...]
     probability: float
@@ -55,7 +55,9 @@ def indistinguishable(
         if all(_has_term(problem, names) for names, _ in one["members"]):
             lost += (1.0 - _NAMELESS) * share
             share *= _NAMELESS
-        found.append(Indistinguishable(_without_idle(one["members"]), share))
+        # of what predicts the same, the name that the field has is the answer
+        members = sorted(_without_idle(one["members"]), key=lambda names: _has_term(problem, names))
+        found.append(Indistinguishable(tuple(members), share))
     return tuple(sorted(found, key=lambda one: -one.probability)), lost
 
 

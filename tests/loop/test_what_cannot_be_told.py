@@ -242,6 +242,15 @@ def test_a_giesekus_flow_curve_slips_at_no_wall_where_modulus_and_time_are_fitte
     assert abs(alpha - 0.5 * (low + high)) < 1.5 * (high - low)
 
 
+def test_of_a_law_and_a_term_that_predict_a_flow_curve_alike_the_law_is_named():
+    declared = replace(TO_FIT, modulus=np.array([3.6]), relaxation_time=np.array([0.6]))
+    both = ["giesekus_mobility", term := "tr(sigma.gammadot)*sigma"]
+    (stage,) = in_flow_curve(
+        lambda rate: Giesekus(0.5, 100.0).steady_shear(rate)[0], declared, both
+    ).stages
+    assert (stage.effect, stage.aliases) == ("giesekus_mobility", (term,))
+
+
 def test_slip_of_a_flow_curve_is_told_where_modulus_and_time_are_known():
     def slips(rate):
         # γ̇ = γ̇ of the fluid + β σ, which rises with the fluid's own rate
