@@ -124,13 +124,7 @@ def find_twins(
     places = [0, *(1 + i for i in same)]
     told = side_by_side.separations(library, [laws[i] for i in places], stresses[places], base)
     return [
-        Twin(
-            law=twin,
-            proof=proof,
-            keeps_N1=d.N1 <= 10.0 * side_by_side.SAME,
-            difference=d,
-            separated_by=by,
-        )
+        Twin(twin, proof, d.N1 <= 10.0 * side_by_side.SAME, d, separated_by=by)
         for ((twin, proof), d), by in zip(kept, told, strict=True)
     ]
 
