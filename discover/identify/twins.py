@@ -114,7 +114,7 @@ def find_twins(
     unique = list(distinct.values())
     if not unique:
         return []
-    laws = [law, *(one[0] for one in unique)]
+    laws = [law, *(one for one, _ in unique)]
     stresses = side_by_side.stresses_in_histories(library, laws, base)
     apart = side_by_side.differences(stresses)
     same = [i for i, d in enumerate(apart) if d.sigma12 <= side_by_side.SAME]

@@ -197,13 +197,10 @@ class DiscrepancyModel:
                 plain.append(own.T @ own)
                 cross.append(curve.T @ own)
                 inner.append(curve.T @ curve)
-            grams, logs = self._without_curves(
-                np.sum(plain, axis=0), np.array(cross), np.array(inner)
-            )
+            of_curves = np.array(cross), np.array(inner)
+            grams, logs = self._without_curves(np.sum(plain, axis=0), *of_curves)
             base = self.fitter.noise.log_determinant(self.record, noise)
-            self._kept[correlation] = _Products(
-                grams, base - logs, np.array(cross), np.array(inner)
-            )
+            self._kept[correlation] = _Products(grams, base - logs, *of_curves)
         return self._kept[correlation]
 
     def _without_curves(

@@ -70,27 +70,16 @@ class LinearErrors:
         first = self.of_transducers.stop
         return slice(first, first + (2 + self._loaded) * len(self.rows.runs))
 
-    @property
-    def _of_zeros(self) -> slice:
-        """Places of zeros, of transducers and of runs, and of drifts."""
-        return slice(self._gains, self._gains + self._zeros.shape[1])
-
-    def _gain(self, sizes: Float[np.ndarray, "*trials q"]) -> Float[np.ndarray, "*trials rows"]:
+    def gain(self, sizes: Float[np.ndarray, " q"]) -> Float[np.ndarray, " rows"]:
         """Return what the transducer of each row multiplies by."""
-        return 1.0 + sizes[..., : self._gains] @ self._read_by.T
-
-    def _factor(self, sizes: Float[np.ndarray, "*trials q"]) -> Float[np.ndarray, "*trials rows"]:
-        """Return what transducer and loading multiply each row by."""
-        if not self._loaded:
-            return self._gain(sizes)
-        return self._gain(sizes) + sizes[..., self._of_zeros.stop :][..., self.rows.run]
+        return 1.0 + self._read_by @ sizes[: self._gains]
 
     def transducer_reading(
         self, predicted: Float[np.ndarray, " rows"], sizes: Float[np.ndarray, " q"]
     ) -> Float[np.ndarray, " rows"]:
         """Return records by what transducers do, without what each run has of its own."""
         common = self._zeros[:, : self._gains] @ sizes[self._gains : self.of_transducers.stop]
-        return predicted * self._gain(sizes) + common
+        return predicted * self.gain(sizes) + common
 
     @property
     def usual_widths(self) -> Float[np.ndarray, " q"]:
@@ -133,9 +122,14 @@ class LinearErrors:
         shifts: Float[np.ndarray, "rows k"],
     ) -> Float[np.ndarray, "trials rows"]:
         """Return records of trials, of what the model predicts of each."""
-        first, k = self.of_runs.stop, shifts.shape[1]
-        found = predicted * self._factor(sizes) + sizes[:, self._of_zeros] @ self._zeros.T
-        return found + sizes[:, first : first + k] @ shifts.T if k else found
+        runs, k = len(self.rows.runs), shifts.shape[1]
+        behind = self._gains + self._zeros.shape[1]
+        zeros, rest = sizes[:, self._gains : behind], sizes[:, behind:]
+        gain = sizes[:, : self._gains] @ self._read_by.T
+        if self._loaded:
+            gain, rest = gain + rest[:, self.rows.run], rest[:, runs:]
+        found = predicted * (1.0 + gain) + zeros @ self._zeros.T
+        return found + rest[:, :k] @ shifts.T if k else found
 
     def like(
         self, fitted: "LinearErrors", sizes: Float[np.ndarray, "*draws q"]
@@ -183,4 +177,7 @@ class LinearErrors:
     ) -> Float[np.ndarray, "rows m"]:
         """Return derivatives of the records, of those of what the model predicts."""
         del predicted  # these errors are in proportion to it, or do not depend on it
-        return slopes * self._factor(sizes)[:, None]
+        gain = self.gain(sizes)
+        if self._loaded:
+            gain += sizes[self._gains + self._zeros.shape[1] :][self.rows.run]
+        return slopes * gain[:, None]
