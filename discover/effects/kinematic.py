@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.linalg import get_lapack_funcs
 from scipy.special import roots_sh_jacobi
 
 from discover.effects.base import (
@@ -17,6 +16,7 @@ from discover.effects.base import (
     SeriesElement,
     Signal,
 )
+from discover.statistics.noise_model import first_order
 
 
 def first_order_lag(times: Signal, values: Signal, time_constant: OfRun) -> Signal:
@@ -59,15 +59,11 @@ def _carried(decay: Float[Array, " m"], forcing: Float[Array, " m"]) -> Float[Ar
 def _carried_in_numpy(
     decay: Float[np.ndarray, "... m"], forcing: Float[np.ndarray, "... m"]
 ) -> Float[np.ndarray, "... n"]:
-    below = np.broadcast_to(-decay, forcing.shape).reshape(-1, forcing.shape[-1])
-    lagged = np.zeros((*forcing.shape[:-1], forcing.shape[-1] + 1))
-    lagged[..., 1:] = forcing
-    # the matrix of the recursion has ones on its diagonal, and one line below it
-    bands = np.ones((2, lagged.shape[-1]))
-    (solve,) = get_lapack_funcs(("tbtrs",), (bands,))
-    for row, own in zip(lagged.reshape(-1, lagged.shape[-1]), below, strict=True):
-        bands[1, :-1] = own
-        row[:] = solve(bands, row[:, None], uplo="L", diag="U")[0][:, 0]
+    ends = (*[(0, 0)] * (forcing.ndim - 1), (1, 0))  # from zero on
+    kept = np.pad(np.broadcast_to(decay, forcing.shape), ends)
+    lagged = np.pad(forcing, ends)
+    for at in np.ndindex(lagged.shape[:-1]):
+        lagged[at] = first_order(kept[at], lagged[at])
     return lagged
 
 
@@ -97,13 +93,13 @@ RATE_GAIN = RateGain(
 )  # fmt: skip
 
 
-def _torque_between_plates(interior: int = 3) -> tuple[tuple[float, ...], ...]:
+def _torque_between_plates() -> tuple[tuple[float, ...], ...]:
     """Radii, and weights of stress and of moduli, for 4 ∫ x² σ(x γ̇) dx: Gauss–Radau for σ/x.
 
     Stress vanishes on the axis, the zero of a transducer does not: it gets what is missing to one.
     """
-    # of the interior nodes Gauss's rule has the weight (1 − x) x³
-    radii, weights = roots_sh_jacobi(interior, 5, 4)
+    # of the three interior nodes Gauss's rule has the weight (1 − x) x³
+    radii, weights = roots_sh_jacobi(3, 5, 4)
     weights = 4.0 * weights / (1.0 - radii)
     of_modulus = np.array([0.0, *weights, 1.0 - np.sum(weights)])
     radii = np.array([0.0, *radii, 1.0])

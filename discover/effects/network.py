@@ -96,7 +96,7 @@ GIESEKUS_MOBILITY = AddedLaw(
     parameters=(
         EffectParameter(
             "alpha", r"\alpha", meaning="mobility", low=0.0, high=1.0, first_trial=0.01,
-            range_source="Giesekus 1982: a mobility that no stress can make negative",
+            range_source=classical.NAMED["giesekus"].range_sources["alpha"],
         ),
     ),
     equation=r"h \mathrel{+}= \alpha\,\sigma\cdot\sigma",
@@ -126,8 +126,7 @@ NON_AFFINE_MOTION = AddedLaw(
 _ELONGATION = EffectParameter(
     "epsilon", r"\varepsilon", meaning="elongational parameter", low=0.0, high=10.0,
     first_trial=0.01,
-    range_source="Phan-Thien & Tanner 1977: fast extension of linear PTT ends at 2 Gλ/ε, "
-    "which ten puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1",
+    range_source=classical.NAMED["ptt_linear"].range_sources["epsilon"],
 )  # fmt: skip
 
 

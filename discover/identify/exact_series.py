@@ -89,8 +89,9 @@ UNKNOWN = "c"
 """A coefficient of a law that is solved for."""
 
 
-_PRIME = 2**61 - 1
-"""Modulo which two numbers that differ agree once in 10^18 times."""
+PRIME = 2**61 - 1
+"""Modulus of exact arithmetic in residues, one machine word: two numbers that differ agree modulo
+it once in 10^18 times."""
 
 
 @no_type_check  # as above
@@ -175,7 +176,7 @@ def same_shear_stress(
     generator = random.Random(2)
     for _ in range(_HISTORIES):
         rate = [Fraction(generator.randint(-9, 9), generator.randint(1, 9)) for _ in range(order)]
-        both = (stress_series(law, rate, linear_relaxation, _PRIME) for law in (first, second))
+        both = (stress_series(law, rate, linear_relaxation, PRIME) for law in (first, second))
         if any(a[3] != b[3] for a, b in islice(zip(*both, strict=True), order + 1)):
             return False
     return True

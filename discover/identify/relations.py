@@ -11,13 +11,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.exact_series import ExactNotation
+from discover.identify.exact_series import PRIME, ExactNotation
 from tensor_library.law_terms import spell
 from tensor_library.library import TermLibrary
-
-_PRIME = 2**61 - 1
-"""Modulus of exact arithmetic in residues: a Mersenne prime of one machine word. A false agreement
-has a chance of about 1e-17."""
 
 _LARGEST_INTEGER = 10**6
 _FRESH_STATES = 5
@@ -103,8 +99,8 @@ def _reduced(rows: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[int]]:
     n = len(rows[0])
     echelon, pivots, idle = np.zeros((0, n), dtype=object), [], 0
     for given in rows:
-        row = np.array(given, dtype=object) % _PRIME
-        row = (row - row[pivots] @ echelon) % _PRIME
+        row = np.array(given, dtype=object) % PRIME
+        row = (row - row[pivots] @ echelon) % PRIME
         leads = np.flatnonzero(row)
         if not len(leads):
             idle += 1
@@ -112,8 +108,8 @@ def _reduced(rows: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[int]]:
                 break  # rows come from random states: the rank is reached
             continue
         idle, lead = 0, int(leads[0])
-        row = row * pow(row[lead], -1, _PRIME) % _PRIME
-        echelon = np.vstack([(echelon - np.outer(echelon[:, lead], row)) % _PRIME, row])
+        row = row * pow(row[lead], -1, PRIME) % PRIME
+        echelon = np.vstack([(echelon - np.outer(echelon[:, lead], row)) % PRIME, row])
         pivots.append(lead)
         if len(pivots) == n:
             break
@@ -126,7 +122,7 @@ def _null_space(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     vectors = []
     for free in sorted(set(range(len(rows[0]))) - set(pivots)):
         residues = np.eye(1, len(rows[0]), free, dtype=int)[0].astype(object)
-        residues[pivots] = -echelon[:, free] % _PRIME
+        residues[pivots] = -echelon[:, free] % PRIME
         exact = [part for value in residues[::-1] if (part := _rational(value)) is not None]
         if len(exact) < len(residues):
             continue
@@ -142,7 +138,7 @@ def _null_space(rows: Sequence[Sequence[int]]) -> list[list[int]]:
 def _rational(residue: int) -> Fraction | None:
     """Return the small fraction with this residue   [Wang 1981, SYMSAC, 212]."""
     limit = 2**29
-    old, new, old_t, new_t = _PRIME, residue, 0, 1
+    old, new, old_t, new_t = PRIME, residue, 0, 1
     while new > limit:
         quotient = old // new
         old, new = new, old - quotient * new

@@ -135,22 +135,14 @@ def stresses_in_histories(
 def differences(stresses: Float[np.ndarray, "laws runs n 3"]) -> list[Difference]:
     """Return how far each law is from the first in the random histories that the first survives."""
     in_histories = stresses[:, : len(random_histories())]
-    return [difference(in_histories[0], other) for other in in_histories[1:]]
-
-
-def difference(
-    reference: Float[np.ndarray, "runs n 3"], other: Float[np.ndarray, "runs n 3"]
-) -> Difference:
-    """Return the largest relative difference of each quantity over the runs."""
-    usable = np.all(np.isfinite(reference), axis=(1, 2))
-    a, b = reference[usable], other[usable]
-    if not usable.any() or not np.all(np.isfinite(b)):
-        return Difference(np.inf, np.inf, np.inf)
-    scale = np.sqrt(np.mean(a**2, axis=1))
+    usable = np.all(np.isfinite(in_histories[0]), axis=(1, 2))
+    reference, others = in_histories[0, usable], in_histories[1:, usable]
+    scale = np.sqrt(np.mean(reference**2, axis=1))
     scale[:, 2] = scale[:, 1]
-    size = np.sqrt(np.mean((a - b) ** 2, axis=1))
-    ratio = np.max(size / np.where(scale > 0, scale, 1.0), axis=0)
-    return Difference(*(float(r) for r in ratio))
+    size = np.sqrt(np.mean((reference - others) ** 2, axis=2))
+    ratio = np.max(size / np.where(scale > 0, scale, 1.0), axis=1, initial=0.0)
+    told = np.any(usable) & np.all(np.isfinite(others), axis=(1, 2, 3))
+    return [Difference(*of) for of in np.where(told[:, None], ratio, np.inf).tolist()]
 
 
 _EXTENSION_RATES = (0.1, 0.3, 1.0)

@@ -114,7 +114,7 @@ def find_twins(
     unique = list(distinct.values())
     if not unique:
         return []
-    laws = [law, *(one[0] for one in unique)]
+    laws = [law, *(one for one, _ in unique)]
     stresses = side_by_side.stresses_in_histories(library, laws, base)
     apart = side_by_side.differences(stresses)
     same = [i for i, d in enumerate(apart) if d.sigma12 <= side_by_side.SAME]
@@ -124,13 +124,7 @@ def find_twins(
     places = [0, *(1 + i for i in same)]
     told = side_by_side.separations(library, [laws[i] for i in places], stresses[places], base)
     return [
-        Twin(
-            law=twin,
-            proof=proof,
-            keeps_N1=d.N1 <= 10.0 * side_by_side.SAME,
-            difference=d,
-            separated_by=by,
-        )
+        Twin(twin, proof, d.N1 <= 10.0 * side_by_side.SAME, d, separated_by=by)
         for ((twin, proof), d), by in zip(kept, told, strict=True)
     ]
 

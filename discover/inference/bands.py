@@ -105,10 +105,8 @@ class Predictions:
 
     def followed(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return those of some hypotheses that run away in none of the runs."""
-        found = self._observed([fit.theta for fit in fits])[..., 0]
-        return [
-            fit for fit, one in zip(fits, found, strict=True) if np.all(self._is_sound(one[None]))
-        ]
+        sound = self._is_sound(self._observed([fit.theta for fit in fits])[..., 0])
+        return [fit for fit, one in zip(fits, sound, strict=True) if np.all(one)]
 
     def _observed(self, thetas: Any, moduli: Any = None) -> np.ndarray:
         """Return the rows of what is recorded, N1 and N2 by vectors, shape (vectors, rows, 3)."""

@@ -73,19 +73,12 @@ def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Run]:
         _start_up(rate, _duration(rate, relaxation_time))
         for rate in sorted({slowest / BEYOND, slowest, fastest, BEYOND * fastest})
     ]
-    found += [
-        bare_run(
-            step_rates([0.0, 0.5 * whole], [fastest, -fastest]),
-            even,
-            f"start-up of shear at {fastest:.3g} 1/s, reversed after {0.5 * whole:.3g} s",
-        ),
-        bare_run(
-            step_rates([0.0, whole / 3, 2 * whole / 3], [fastest, 0.0, fastest]),
-            even,
-            f"start-up of shear at {fastest:.3g} 1/s, stopped for {whole / 3:.3g} s and begun "
-            "again",
-        ),
-    ]
+    title = f"start-up of shear at {fastest:.3g} 1/s"
+    half, third = 0.5 * whole, whole / 3
+    turned = step_rates([0.0, half], [fastest, -fastest])
+    found.append(bare_run(turned, even, f"{title}, reversed after {half:.3g} s"))
+    paused = step_rates([0.0, third, 2 * third], [fastest, 0.0, fastest])
+    found.append(bare_run(paused, even, f"{title}, stopped for {third:.3g} s and begun again"))
     after = np.geomspace(_SHORTEST * relaxation_time, _RELAXED * relaxation_time, _SAMPLES)
     stopped = after_steady_flow(start_up(0.0), fastest, end=float(after[-1]))
     title = f"relaxation after steady shear at {fastest:.3g} 1/s"

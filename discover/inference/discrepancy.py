@@ -52,6 +52,9 @@ _TRANSIENT = 0.2
 _SHARED = 0.2
 """Prior share of discrepancies that are one curve in all runs."""
 
+_TERMS_ALONE = 0.1
+"""Prior odds of unused terms without a curve."""
+
 _THIRD = 1.0 / 3.0
 
 _CELLS = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
@@ -71,18 +74,15 @@ class _Curve(NamedTuple):
     shared: bool = False
 
 
-_NO_CURVE = _Curve(0.0, STIFFNESS[0], 0.0)
-
-
 @dataclass(frozen=True)
 class Member:
     """One discrepancy of the grid.
 
-    `curve`, `growth`: ρ over the noise, power of the rate. `which`, `correlation`: its curve in the
-    grid, zero for none, and the correlation of the noise beside it. `log_weight`: log of its
-    probability among all of the hypothesis. `noise`: size of the noise over the records. `mean`,
-    `root`: of the constants and terms, in units of their priors: the covariance is noise² root
-    rootᵀ.
+    `curve`, `growth`: ρ over the noise, zero without a curve, power of the rate. `which`,
+    `correlation`: its curve in the grid, and the correlation of the noise beside it. `log_weight`:
+    log of its probability among all of the hypothesis. `noise`: size of the noise over the records.
+    `mean`, `root`: of the constants and terms, in units of their priors: the covariance is noise²
+    root rootᵀ.
     """
 
     curve: float
@@ -98,8 +98,8 @@ class Member:
 class _Products(NamedTuple):
     """Products of what was left and columns, curves being integrated out; and those with curves.
 
-    `gram`: shape (1 + grid, 1 + m, 1 + m), without a curve first. `log_determinant`: shape (1 +
-    grid,). `cross`, `inner`: of curves with the others and with themselves, of each run.
+    `gram`: shape (grid, 1 + m, 1 + m). `log_determinant`: shape (grid,). `cross`, `inner`: of
+    curves with the others and with themselves, of each run.
     """
 
     gram: Float[np.ndarray, "grid n n"]
@@ -126,8 +126,10 @@ class DiscrepancyModel:
         stiff = fit.priors.pulls(fit.coordinates)[:, 1]
         self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.errors.usual_widths])
         self.offset = np.concatenate([fit.coordinates - fit.priors.centres, fit.linear])
-        self.names, self._steps = self._others()
-        unused = self.signatures(fitter, fit.predicted) / rows.size[:, None]
+        problem = fitter.problem
+        self.names = [e.name for e in problem.candidates if e.name not in fit.names]
+        self._steps = np.array([1e-2 * problem.amplitude(name).width for name in self.names])
+        unused = self._signatures() / rows.size[:, None]
         size = np.sqrt(np.mean(unused**2, axis=0))
         unused *= np.where(size > 0, _THIRD / np.maximum(size, 1e-300), 0.0)
         # many are alike: amplitudes that are as likely in all directions are so along these too
@@ -144,29 +146,19 @@ class DiscrepancyModel:
         ]
         if len(rows.runs) > 1:
             curves += product(CURVES, STIFFNESS, GROWTHS[:1], (False,), (True,))
-        self._grid = [_Curve(*one) for one in curves]
+        # none first
+        self._grid = [_Curve(0.0, STIFFNESS[0], 0.0), *(_Curve(*one) for one in curves)]
         self._kept: dict[float, _Products] = {}
         self.members, self.log_factor = self._weighed()
 
-    def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
-        problem = self.fitter.problem
-        names = [e.name for e in problem.candidates if e.name not in self.fit.names]
-        return names, np.array([1e-2 * problem.amplitude(n).width for n in names])
-
-    def _at(self, name: str) -> int:
-        return self.fitter.problem.model.positions(name)[0]
-
-    def signatures(
-        self, fitter: Fitter, predicted: Float[np.ndarray, " rows"]
-    ) -> Float[np.ndarray, "rows k"]:
+    def _signatures(self) -> Float[np.ndarray, "rows k"]:
         """Return what one of each effect that is not there does to records, in Pa."""
-        thetas = []
-        for name, step in zip(self.names, self._steps, strict=True):
-            theta = self.fit.theta.copy()
-            theta[self._at(name)] += step
-            thetas.append(theta)
+        fitter, fit = self.fitter, self.fit
+        at = [fitter.problem.model.positions(name)[0] for name in self.names]
+        thetas = np.tile(fit.theta, (len(at), 1))
+        thetas[np.arange(len(at)), at] += self._steps
         with np.errstate(over="ignore", invalid="ignore"):  # an effect that runs away
-            found = (fitter.predict(thetas) - predicted).T / self._steps
+            found = (fitter.predict(thetas) - fit.predicted).T / self._steps
         return np.where(np.all(np.isfinite(found), axis=0), found, 0.0)
 
     # the grid ---------------------------------------------------------------------------------
@@ -205,13 +197,10 @@ class DiscrepancyModel:
                 plain.append(own.T @ own)
                 cross.append(curve.T @ own)
                 inner.append(curve.T @ curve)
-            grams, logs = self._without_curves(
-                np.sum(plain, axis=0), np.array(cross), np.array(inner)
-            )
+            of_curves = np.array(cross), np.array(inner)
+            grams, logs = self._without_curves(np.sum(plain, axis=0), *of_curves)
             base = self.fitter.noise.log_determinant(self.record, noise)
-            self._kept[correlation] = _Products(
-                grams, base - logs, np.array(cross), np.array(inner)
-            )
+            self._kept[correlation] = _Products(grams, base - logs, *of_curves)
         return self._kept[correlation]
 
     def _without_curves(
@@ -219,13 +208,13 @@ class DiscrepancyModel:
         plain: Float[np.ndarray, "n n"],
         cross: Float[np.ndarray, "runs k n"],
         inner: Float[np.ndarray, "runs k k"],
-    ) -> tuple[Float[np.ndarray, "one_more n n"], Float[np.ndarray, " one_more"]]:
+    ) -> tuple[Float[np.ndarray, "grid n n"], Float[np.ndarray, " grid"]]:
         """Return products with each curve of the grid integrated out, and half log determinants.
 
-        The first is without a curve. Curves of one spectrum differ in size alone, so that one
+        Curves of one spectrum differ in size alone, so that one
         decomposition S K S = Q Λ Qᵀ of each run, or of all together, serves all of these.
         """
-        kinds, grams, logs = {}, [plain], [0.0]
+        kinds, grams, logs = {}, [], []
         for curve in self._grid:
             kind = curve._replace(size=1.0, growth=0.0)
             if kind not in kinds:
@@ -284,7 +273,7 @@ class DiscrepancyModel:
                 prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))
                 for which, (value, square) in enumerate(zip(values, squares, strict=True)):
                     if which or terms:
-                        log = value + prior + (own[which - 1] if which else np.log(0.1))
+                        log = value + prior + own[which]
                         some.append(
                             (log, correlation, (terms, scatter), which, np.sqrt(square / n))
                         )
@@ -299,13 +288,14 @@ class DiscrepancyModel:
                 break
             scale, _ = self._scale(*terms)
             mean, root = _posterior(self._products(correlation).gram[which], scale)
-            size, _, growth, *_ = self._grid[which - 1] if which else _NO_CURVE
-            log = float(weight - total)
-            members.append(Member(size, growth, which, correlation, log, float(noise), mean, root))
+            curve, log = self._grid[which], float(weight - total)
+            members.append(
+                Member(curve.size, curve.growth, which, correlation, log, float(noise), mean, root)
+            )
         return members, total - none
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
-        """Return the log prior of each curve.
+        """Return the log prior of each curve of the grid, and of none beside unused terms.
 
         Sizes are uniform up to what the smallest effect takes away, and a fifth asks nothing of
         them. What is too small to be seen is no discrepancy.
@@ -315,14 +305,14 @@ class DiscrepancyModel:
         if np.isfinite(limit):
             inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
             share = 0.8 * inside + 0.2 * share
-        kinds = [(one.after_a_step, one.shared) for one in self._grid]
+        curves = self._grid[1:]
+        kinds = [(one.after_a_step, one.shared) for one in curves]
         known = {(True, False): _TRANSIENT, (False, True): _SHARED}
         of_kind = {kind: known.get(kind, 0.0) for kind in kinds}
         of_kind[False, False] = 1.0 - sum(of_kind.values())
         each = [of_kind[kind] * len(CURVES) / kinds.count(kind) for kind in kinds]
-        return np.log(
-            [share[CURVES.index(c.size)] * p for c, p in zip(self._grid, each, strict=True)]
-        )
+        known = [share[CURVES.index(c.size)] * p for c, p in zip(curves, each, strict=True)]
+        return np.log([_TERMS_ALONE, *known])
 
     def sizes(self, draws: int, lot: np.random.Generator) -> Float[np.ndarray, "draws runs"]:
         """Return draws of the root mean square of the discrepancy of each run, over its size."""
@@ -337,7 +327,7 @@ class DiscrepancyModel:
             normal = lot.standard_normal((len(at), member.root.shape[1]))
             own = member.mean + member.noise * normal @ member.root.T
             off = own[:, c:] @ self.columns[:, c:].T
-            if member.which:
+            if member.curve:
                 off = off + self._drawn_curves(member, own, lot)
             for i in range(len(self.growth)):
                 part = off[:, rows.run == i] / rows.size[rows.run == i]
@@ -347,7 +337,7 @@ class DiscrepancyModel:
     def _drawn_curves(self, member: Member, own: np.ndarray, lot: np.random.Generator):
         """Return draws of the curves of all runs, given constants and terms, in Pa."""
         products, rows = self._products(member.correlation), self.fitter.rows
-        curve, out = self._grid[member.which - 1], np.zeros((len(own), len(self.left)))
+        curve, out = self._grid[member.which], np.zeros((len(own), len(self.left)))
         half, spectrum = half_of(curve.after_a_step), spectrum_of(curve.stiffness)
         swings = self._swings(curve)
         for runs in [np.arange(len(swings))] if curve.shared else np.arange(len(swings))[:, None]:

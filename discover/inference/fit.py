@@ -26,7 +26,7 @@ class Fit:
     where an effect ends at zero or the law runs away. `vanished`: effects whose amplitude ended at
     zero. `without`: a run whose rows the fit does not see; None for none. `shifts`: what errors of
     the moduli do to predictions, in Pa, shape (rows, k). `shifted`: the predictions that these are
-    of, shape (rows,).
+    of, shape (rows,); None before they are taken, as if moduli had no errors.
     """
 
     names: tuple[str, ...]
@@ -37,6 +37,7 @@ class Fit:
     log_likelihood: float
     log_posterior: float
     noise: Noise
+    shifts: Float[np.ndarray, "rows k"]
     slopes: Float[np.ndarray, "rows free"] | None = None
     jacobian: Float[np.ndarray, "rows n"] | None = None
     covariance: Float[np.ndarray, "n n"] | None = None
@@ -44,7 +45,6 @@ class Fit:
     log_evidence: float = -np.inf
     vanished: tuple[str, ...] = ()
     without: int | None = None
-    shifts: Float[np.ndarray, "rows k"] | None = None
     shifted: Float[np.ndarray, " rows"] | None = None
     damping: float = 1e-2
     memory: dict = field(default_factory=dict)

@@ -57,7 +57,7 @@ class Fitter:
         self._without: dict[int | None, NoiseModel] = {None: self.noise}
         self._priors: dict[tuple[str, ...], tuple[Priors, np.ndarray]] = {}
         self._moduli = self._moved_moduli()
-        self._shifts = np.zeros((len(rows), len(self._moduli)))
+        self._no_shifts = np.zeros((len(rows), len(self._moduli)))
         self.errors = self.errors_of(rows)
 
     def errors_of(self, rows: Rows) -> LinearErrors:
@@ -98,7 +98,7 @@ class Fitter:
 
     def _is_shifted_anew(self, fit: Fit) -> bool:
         """Return whether what errors of the moduli do is to be taken at other constants."""
-        if fit.shifts is None:
+        if fit.shifted is None:
             return len(self._moduli) > 0
         moved = (fit.predicted - fit.shifted) / self.rows.size
         with _running_away():
@@ -138,7 +138,10 @@ class Fitter:
         linear = np.zeros(len(self.errors)) if linear is None else linear
         nothing = np.full(len(self.rows), np.nan)
         empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
-        return Fit(tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty)
+        return Fit(
+            tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty,
+            self._no_shifts,
+        )  # fmt: skip
 
     def _set(self, fits: Sequence[Fit], predicted: Sequence[Float[np.ndarray, " rows"]]) -> None:
         """Set what predictions of the model say of hypotheses."""
@@ -180,11 +183,8 @@ class Fitter:
         """Set the derivatives of the records, of those of the predictions."""
         assert fit.slopes is not None
         slopes = self.errors.through(fit.slopes, fit.predicted, fit.linear)
-        linear = self.errors.columns(fit.predicted, self._shifts_in(fit))
+        linear = self.errors.columns(fit.predicted, fit.shifts)
         fit.jacobian = np.column_stack([slopes, linear])
-
-    def _shifts_in(self, fit: Fit) -> Float[np.ndarray, "rows k"]:
-        return self._shifts if fit.shifts is None else fit.shifts
 
     def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return the records as predicted, with what is linear."""
@@ -197,7 +197,7 @@ class Fitter:
         linear: Float[np.ndarray, "trials q"],
     ) -> Float[np.ndarray, "trials rows"]:
         """Return the records of trials of a fit, as the model predicts them and what is linear."""
-        return self.errors.recorded(predicted, linear, self._shifts_in(fit))
+        return self.errors.recorded(predicted, linear, fit.shifts)
 
     def misfit(self, fit: Fit) -> float:
         """Return the root mean square of what a fit leaves, over the size of each record."""

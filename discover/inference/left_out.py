@@ -90,15 +90,14 @@ def screened_to_first_order(fitter: Fitter, fits: Sequence[Fit]) -> list[Fit]:
     return [fits[at] for at in np.argsort(rough, kind="stable")[:_FIRST]]
 
 
-def predictive_mixture(
-    fitter: Fitter, fits: Sequence[Fit]
-) -> list[tuple[Fit, float, Float[np.ndarray, " runs"]]]:
-    """Return how far to rely on the first of some hypotheses, and how they miss runs left out."""
+def predictive_mixture(fitter: Fitter, fits: Sequence[Fit]) -> tuple[tuple[Fit, float], ...]:
+    """Return how far to rely on the first of some hypotheses, which remember what they miss."""
     some = fits[:_EXACT]
     missed = left_out(fitter, some)
+    for fit, own in zip(some, missed, strict=True):
+        fit.memory["missed"] = own
     weights = weights_of(missed)
-    order = np.argsort(-weights, kind="stable")
-    return [(some[at], float(weights[at]), missed[at]) for at in order]
+    return tuple((some[at], float(weights[at])) for at in np.argsort(-weights, kind="stable"))
 
 
 def weights_of(missed: Float[np.ndarray, "fits runs"]) -> Float[np.ndarray, " fits"]:

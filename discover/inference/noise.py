@@ -109,15 +109,15 @@ class NoiseModel:
     def _decay(self, correlation: float) -> Float[np.ndarray, " rows"]:
         return np.where(self._gap > 0, correlation ** np.maximum(self._gap, 1), 0.0)
 
-    def log_determinant(self, predicted: Float[np.ndarray, " rows"], noise: "Noise") -> float:
+    def log_determinant(self, predicted: Float[np.ndarray, " rows"], noise: Noise) -> float:
         """Return the log determinant of what `whitened` multiplies by."""
-        deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
-        decay = self._decay(noise.correlation)
-        return float(-0.5 * np.sum(np.log(1.0 - decay**2)) - np.sum(np.log(deviation)))
+        decay, scale = self._decay(noise.correlation), self._scale(predicted, noise)
+        return float(-0.5 * np.sum(np.log(1.0 - decay**2)) - np.sum(np.log(scale)))
 
-    def deviation(self, predicted: Float[np.ndarray, " rows"], share: float):
-        """Return the standard deviation of each row over the size of its run's noise, in Pa."""
-        return deviation(self.rows.size, predicted, share)
+    def _scale(self, predicted: Float[np.ndarray, " rows"], noise: Noise):
+        """Return the standard deviation of each row that is kept, in Pa."""
+        of_size_one = deviation(self._size, predicted[self.kept], noise.share)
+        return of_size_one * noise.sizes[self._run]
 
     def log_likelihood(
         self, residual: Float[np.ndarray, " rows"], predicted: Float[np.ndarray, " rows"]
@@ -192,9 +192,9 @@ class NoiseModel:
         at = CORRELATIONS.index(noise.correlation)
         if at == 0:
             return noise
-        deviation = self.deviation(predicted, noise.share)[self.kept]
-        scaled = residual[self.kept] / deviation
-        own = (LEAST * self.rows.size[self.kept] / deviation) ** 2
+        of_size_one = deviation(self._size, predicted[self.kept], noise.share)
+        scaled = residual[self.kept] / of_size_one
+        own = (LEAST * self._size / of_size_one) ** 2
 
         def of(correlation: float):
             decay = self._decay(correlation)
@@ -228,8 +228,7 @@ class NoiseModel:
 
     def least(self, predicted: Float[np.ndarray, " rows"], noise: Noise) -> float:
         """Return the sum of squares that `whitened` makes of the independent noise `LEAST`."""
-        deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
-        own = (LEAST * self.rows.size[self.kept] / deviation) ** 2
+        own = (LEAST * self._size / self._scale(predicted, noise)) ** 2
         decay = self._decay(noise.correlation) ** 2
         return float(np.sum((own + decay * own[self._before]) / (1.0 - decay)))
 
@@ -240,8 +239,7 @@ class NoiseModel:
         noise: Noise,
     ) -> Float[np.ndarray, "kept k"]:
         """Return columns of the rows that are kept, over independent noise of variance one."""
-        deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
-        scaled = values[self.kept] / deviation[:, None]
+        scaled = values[self.kept] / self._scale(predicted, noise)[:, None]
         decay = self._decay(noise.correlation)[:, None]  # zero at the first of a run
         scaled[1:] -= decay[1:] * scaled[:-1]
         scaled /= np.sqrt(1.0 - decay**2)

@@ -321,10 +321,7 @@ def _predictive_mixture(posterior: Posterior) -> tuple[tuple[Fit, float], ...]:
     first = screened_to_first_order(search.fitter, search.ranked())
     if rows is not None:
         first = Predictions(posterior, rows).followed(first) or first
-    found = predictive_mixture(search.fitter, first)
-    for fit, _, missed in found:
-        fit.memory["missed"] = missed
-    return tuple((fit, weight) for fit, weight, _ in found)
+    return predictive_mixture(search.fitter, first)
 
 
 def smallest(search: Search, fit: Fit) -> float:

@@ -140,8 +140,7 @@ class Problem:
 
     def _known(self) -> dict[int, Prior]:
         """Return priors of what is always free: the declared constants, and the bench."""
-        model, found = self.model, {}
-        sizes = {"one": 1.0} | self.scales
+        model, found, sizes = self.model, {}, {"one": 1.0} | self.scales
         units = {
             at: sizes.get(parameter.scale, 1.0)
             for known in model.declared.effects
@@ -166,12 +165,11 @@ class Problem:
         for nuisance in NUISANCES:
             effect = self.effects[nuisance.effect]
             first = effect.parameters[0]
-            unit = ({"one": 1.0} | self.scales)[first.scale]
             position = model.positions(effect.name)[0]
             if self.computed or position in found or effect.name in declared:
                 continue
             found[position] = Prior(
-                "normal", 0.0, nuisance.sound * first.first_trial * unit,
+                "normal", 0.0, nuisance.sound * first.first_trial * sizes[first.scale],
                 float(model.low[position]), float(model.high[position]),
             )  # fmt: skip
         for position in range(model.instants.start, model.instants.stop):
@@ -244,16 +242,12 @@ class Problem:
         priors = [
             self._inner(at, p) for at, p in zip(positions, effect.parameters[1:], strict=True)
         ]
-        if not any(prior.is_logarithm for prior in priors):
-            return [{at: prior.middle for at, prior in zip(positions, priors, strict=True)}]
+        middles = {at: prior.middle for at, prior in zip(positions, priors, strict=True)}
+        of_order = {at: p for at, p in zip(positions, priors, strict=True) if p.is_logarithm}
         return [
-            {
-                at: float(np.clip(stretch * prior.middle, prior.low, prior.high))
-                if prior.is_logarithm
-                else prior.middle
-                for at, prior in zip(positions, priors, strict=True)
-            }
-            for stretch in _STARTS
+            middles
+            | {at: float(np.clip(x * p.middle, p.low, p.high)) for at, p in of_order.items()}
+            for x in (_STARTS if of_order else (1.0,))
         ]
 
     @property

@@ -151,21 +151,21 @@ class Search:
         ]
         if not asked:
             return []
-        thetas, steps, priors = [], [], []
+        positions = {name: problem.model.positions(name)[0] for name, *_ in asked}
+        priors = {name: problem.amplitude(name) for name in positions}
+        thetas, steps = [], []
         for name, inner, probe in asked:
-            theta, at = fit.theta.copy(), problem.model.positions(name)[0]
-            for position, value in inner.items():
-                theta[position] = value
-            prior = problem.amplitude(name)
-            centre = theta[at] if at in fit.priors else 0.0  # a nuisance that may be at fault
+            theta, at, prior = fit.theta.copy(), positions[name], priors[name]
+            theta[[*inner]] = [*inner.values()]
+            # what is there already is a nuisance that may be at fault
+            theta[at] = theta[at] if at in fit.priors else 0.0
             step = probe * prior.width
-            step = -step if centre + step > prior.high else step
-            theta[at] = centre + step
+            steps.append(-step if theta[at] + step > prior.high else step)
             thetas.append(theta)
-            steps.append(step)
-            priors.append(prior)
+        moved = np.array(thetas)
+        moved[np.arange(len(asked)), [positions[name] for name, *_ in asked]] += steps
         with np.errstate(over="ignore", invalid="ignore"):  # an effect that runs away
-            columns = (fitter.predict(thetas) - fit.predicted).T / np.array(steps)
+            columns = (fitter.predict(moved) - fit.predicted).T / np.array(steps)
         usable = np.all(np.isfinite(columns), axis=0)
         columns = np.where(usable, columns, 0.0)
         record = fitter.record(fit)
@@ -178,8 +178,8 @@ class Search:
         curvature = np.sum(new**2, axis=0) - np.sum(shared**2, axis=0)
         total, count = float(left @ left), len(left)
         best: dict[Any, tuple[float, Fit]] = {}
-        for i, ((name, inner, _), prior) in enumerate(zip(asked, priors, strict=True)):
-            at = problem.model.positions(name)[0]
+        for i, ((name, inner, _), theta) in enumerate(zip(asked, thetas, strict=True)):
+            at, prior = positions[name], priors[name]
             stiff = max(float(curvature[i]), 0.0) + 1.0 / prior.width**2
             middle, variance = prior.centre, prior.width**2
             size = float(np.clip((slope[i] + middle / variance) / stiff, prior.low, prior.high))
@@ -194,12 +194,7 @@ class Search:
             key = (name, *inner.items()) if every_start else name
             if key in best and best[key][0] >= score:
                 continue
-            theta = fit.theta.copy()
-            for position, value in inner.items():
-                theta[position] = value
-            theta[at] = np.clip(
-                theta[at] + size if at in fit.priors else size, prior.low, prior.high
-            )
+            theta[at] = np.clip(theta[at] + size, prior.low, prior.high)
             best[key] = score, fitter.start((*fit.names, name), theta, fit.linear)
             share = max(-np.expm1(-2.0 * gain / count), 0.0)
             best[key][1].memory["scored"] = float(share), float(score)

@@ -1,9 +1,7 @@
 """Outliers of records."""
 
-from collections.abc import Callable
-
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 _WIDEST = 2  # samples side by side that may be off together
 _BESIDE = 3  # samples on either side by which they are judged
@@ -28,27 +26,15 @@ def isolated_outliers(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]
     Samples of exactly zero are held against those that are not.
     """
     values = np.asarray(record, dtype=float)
-
-    def apart(left):
-        return np.any([_apart(values[left], width) for width in range(1, _WIDEST + 1)], axis=0)
-
-    left = np.flatnonzero(~(_apart_near_ends(values) | _dropped(values)))
-    return _set_aside(left, len(values), apart)
-
-
-def _set_aside(
-    left: Int[np.ndarray, " m"], n: int, find: Callable[[np.ndarray], np.ndarray]
-) -> Bool[np.ndarray, " _"]:
-    """Return which of n samples `find` takes out, asked again of what remains."""
-    for _ in range(_PASSES):
+    off = _apart_near_ends(values) | _dropped(values)
+    for _ in range(_PASSES):  # asked again of what remains
+        left = np.flatnonzero(~off)
         if len(left) < 2 * _BESIDE + _WIDEST:
             break
-        found = find(left)
-        if not np.any(found):
+        found = [_apart(values[left], width) for width in range(1, _WIDEST + 1)]
+        off[left] = np.any(found, axis=0)
+        if not np.any(off[left]):
             break
-        left = left[~found]
-    off = np.ones(n, dtype=bool)
-    off[left] = False
     return off
 
 

@@ -20,7 +20,7 @@ from discover.inference.bands import Predictions, quantiles
 from discover.inference.closed_forms import integrated_rate
 from discover.inference.fit import Fit
 from discover.inference.fits import Fitter
-from discover.inference.noise import LEAST, Noise, NoiseModel
+from discover.inference.noise import LEAST, Noise, NoiseModel, deviation
 from discover.inference.posterior import Posterior, posterior_of
 from discover.inference.priors import Deviations, Prior, Priors
 from discover.inference.problem import SCATTER_OF_RUNS, Problem
@@ -72,10 +72,10 @@ def test_whitening_is_the_density_of_correlated_noise(rows, correlation, share):
     noise = Noise(np.array([0.01, 0.03]), 0.02, correlation, share)
     white = model.whitened(residual[:, None], predicted, noise)[:, 0]
     found = model.log_determinant(predicted, noise) - 0.5 * white @ white
-    deviation = model.deviation(predicted, share) * noise.sizes[rows.run]
+    spread = deviation(rows.size, predicted, share) * noise.sizes[rows.run]
     same = rows.run[:, None] == rows.run
     apart = np.abs(np.subtract.outer(np.arange(len(rows)), np.arange(len(rows))))
-    covariance = np.outer(deviation, deviation) * same * correlation**apart
+    covariance = np.outer(spread, spread) * same * correlation**apart
     exact = multivariate_normal(np.zeros(len(rows)), covariance).logpdf(residual)
     constant = 0.5 * len(rows) * np.log(2 * np.pi)
     assert found - constant == pytest.approx(exact, rel=1e-9)  # rounding of a determinant
