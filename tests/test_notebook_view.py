@@ -109,20 +109,14 @@ def learned(base=None):
     return LearnerResult("tensor_sindy", law, terms, 1.0, {}, "ended <b>well</b>")
 
 
-def test_the_sympy_form_is_the_extra_term():
+def test_a_result_is_the_extra_term_a_table_with_intervals_and_an_escaped_view():
     wanted = 0.25 * STRESS**2 + (sympy.exp(0.5 * Trace(STRESS)) - 1) * STRESS
     assert sympy.expand(learned().sympy() - wanted) == 0
-
-
-def test_the_table_has_a_line_for_each_term_with_its_interval():
     table = learned().table()
     assert table["term"].tolist() == ["sigma.sigma", EXPONENTIAL]
     assert table.loc[0, ["low", "high"]].tolist() == [0.2, 0.3]
     assert np.isnan(table.loc[1, "low"])
     assert table.loc[1, "inner"] == "epsilon = 0.5"
-
-
-def test_a_notebook_shows_equation_and_table_and_escapes_text():
     shown = learned()._repr_html_()
     assert "<math" in shown
     assert "<table" in shown

@@ -82,9 +82,9 @@ def studies(tmp_path, monkeypatch):
     return paths
 
 
-def worker_with_stand_in(folder):
-    """The command line of a worker that runs the stand-in."""
-    code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
+def worker_with_stand_in(folder, first=""):
+    """The command line of a worker that runs some code, and the stand-in."""
+    code = f"{first}import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
     return [sys.executable, "-P", "-c", code + "from discover.batch.worker import main; main()"]
 
 
@@ -319,8 +319,7 @@ def dying_workers(tmp_path, monkeypatch, deaths):
         f"stream = open({str(count)!r}, 'a+'); stream.write('x'); stream.flush()\n"
         f"stream.seek(0); len(stream.read()) > {deaths} or os.kill(os.getpid(), signal.SIGKILL)\n"
     )
-    *python, code = worker_with_stand_in(tmp_path)
-    monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
+    monkeypatch.setattr(workers, "_COMMAND", worker_with_stand_in(tmp_path, fatal))
 
 
 def test_workers_open_no_port_and_may_die_at_start(studies, strange, calm, tmp_path, monkeypatch):
@@ -354,8 +353,7 @@ def test_a_study_that_kills_every_worker_is_given_up_alone(studies, tmp_path, mo
         "given = jobs(sys.stdin.buffer)\n"
         "sys.stdin = SimpleNamespace(buffer=chain([next(given)], given))\n"
     )
-    *python, code = worker_with_stand_in(tmp_path)
-    monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
+    monkeypatch.setattr(workers, "_COMMAND", worker_with_stand_in(tmp_path, fatal))
     result = batch.run_batch(studies[:2], tmp_path / "out", workers=2)
     assert [s.status for s in result.studies] == ["done", "failed"]
     assert result.studies[1].text.startswith("Several workers died")

@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 import pytest
 from command_line import invoke
-from fewer_hypotheses import few_candidates, verdict_alone
+from fewer_hypotheses import few_candidates, verdict_alone, without_pictures
 from made_exports import write_runs
 
 from discover.compilation_cache import enable_compilation_cache, remove_cut_short
@@ -58,9 +58,7 @@ def trained(monkeypatch):
 @pytest.fixture
 def undrawn(monkeypatch):
     """A page of the verdict without pictures, where what a command does with it is asked."""
-    monkeypatch.setattr(
-        "discover.report.comparison.report.comparison_pictures", lambda *_: ([], [])
-    )
+    without_pictures(monkeypatch)
 
 
 def data_folder(path, **columns):
@@ -89,7 +87,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
     assert law["tested"]["judged_in"]["De"][1] == 1.5
     before = (out / "comparison.json").read_bytes()
     with monkeypatch.context() as patch:
-        patch.setattr("discover.report.comparison.report.comparison_pictures", lambda *_: ([], []))
+        without_pictures(patch)
         fresh = invoke("compare", study, "--out", out, "--overwrite", "--json")
     assert len(trained) == 4
     assert json.loads(fresh.stdout) == json.loads(before)

@@ -4,22 +4,7 @@ import made_exports as ex
 import numpy as np
 import openpyxl
 import pytest
-from made_exports import (
-    EXACT,
-    LAMBDA,
-    OMEGA,
-    RATES,
-    STRAINS,
-    TIMES,
-    assert_softening,
-    assert_sweep,
-    exported,
-    imported,
-    lines,
-    moduli,
-    run,
-    softening,
-)
+from made_exports import EXACT, LAMBDA, OMEGA, RATES, STRAINS, TIMES, imported, lines, moduli, run
 
 from discover.dataset import load_dataset
 
@@ -33,7 +18,7 @@ def trios(mark):
     head = [mark.join(pair) for pair in (("Filename", "a.tri"), ("Gap", "1000.0 µm"))]
     rows = [*head, *osc, ""]
     rows[rows.index("{}")] = "Amplitude sweep - 1"
-    a, b = softening(STRAINS)
+    a, b = ex.softening(STRAINS)
     rows[-1:] = lines(10.0, STRAINS * 100, 0.0, a * 1e-6, b * 1e-3, mark=mark)
     rows += ["", *(line.replace("{}", "Frequency sweep - 2") for line in osc)]
     a, b = moduli(OMEGA)
@@ -46,13 +31,13 @@ def trios(mark):
 @pytest.mark.parametrize(("name", "mark"), [("a.txt", "\t"), ("a.csv", ",")])
 def test_steps_of_trios_become_the_tables_that_they_are(tmp_path, name, mark):
     out, result = imported(tmp_path, name, trios(mark))
-    assert_softening(out / "amplitude_sweep.csv")
-    assert_sweep(out / "lve.csv")
+    ex.assert_softening(out / "amplitude_sweep.csv")
+    ex.assert_sweep(out / "lve.csv")
     ex.assert_curve(out, 3.0)
     assert not (out / "runs.csv").exists()
     assert "block 1 Amplitude sweep - 1: read as an amplitude sweep" in result.stdout
     again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
-    assert_softening(again / "amplitude_sweep.csv")
+    ex.assert_softening(again / "amplitude_sweep.csv")
 
 
 def test_a_spreadsheet_is_read_sheet_by_sheet(tmp_path):
@@ -66,7 +51,7 @@ def test_a_spreadsheet_is_read_sheet_by_sheet(tmp_path):
         second.append([float(w), float(a) / 1e3, float(b)])
     book.save(tmp_path / "a.xlsx")
     out, result = run(tmp_path, tmp_path / "a.xlsx")
-    assert_sweep(out / "lve.csv")
+    ex.assert_sweep(out / "lve.csv")
     assert "Frequency sweep - 2" in result.stdout
 
 
@@ -84,11 +69,11 @@ def ares(temperatures):
 def test_sweeps_at_several_temperatures_stay_apart_and_one_can_be_chosen(tmp_path):
     out, result = imported(tmp_path, "a.txt", ares((150, 140, -10)), encoding="cp1252")
     for degrees in (150, 140, -10):
-        assert_sweep(out / f"lve_{degrees}C.csv", shift=2.0 ** (-degrees / 10))
+        ex.assert_sweep(out / f"lve_{degrees}C.csv", shift=2.0 ** (-degrees / 10))
     assert not (out / "lve.csv").exists()
     assert "3 temperatures, 150 to -10 °C" in result.stdout
     out, _ = imported(tmp_path, "a.txt", ares((150, 140)), "--temperature", 140, "--overwrite")
-    assert_sweep(out / "lve.csv", shift=2.0**-14)
+    ex.assert_sweep(out / "lve.csv", shift=2.0**-14)
 
 
 def test_german_rheocompass_with_waveforms_gives_the_sweep_and_the_waves(tmp_path):
@@ -97,13 +82,13 @@ def test_german_rheocompass_with_waveforms_gives_the_sweep_and_the_waves(tmp_pat
     rows = ["Projekt:\tGel", "Test:\tLAOS 1", "Ergebnis:\tLAOS", "", "\t".join(names), ""]
     rows += ["\t\t[%]\t[rad/s]\t[kPa]\t[Pa]\t[%]\t[Pa]"]
     phase = 2 * np.pi * np.arange(64) / 64
-    for i, (g, a, b) in enumerate(zip(STRAINS, *softening(STRAINS), strict=True), start=1):
+    for i, (g, a, b) in enumerate(zip(STRAINS, *ex.softening(STRAINS), strict=True), start=1):
         point = [str(i), *(repr(float(v)) for v in (100 * g, 10.0, a / 1e3, b)), "", ""]
         rows.append("\t".join(["", *point]).replace(".", ","))
         wave = 100 * g * np.sin(phase), g * (a * np.sin(phase) + b * np.cos(phase))
         rows += lines(*wave, comma=True, before="\t\t\t\t\t")
     out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
-    assert_softening(out / "amplitude_sweep.csv")
+    ex.assert_softening(out / "amplitude_sweep.csv")
     data = load_dataset(out)
     assert len(data) == len(STRAINS)
     assert [row["start"] for row in (r.metadata for r in data)] == ["periodic"] * 9
@@ -125,7 +110,7 @@ def test_actions_of_rspace_are_told_apart_by_their_name_in_the_first_column(tmp_
         rows.append(f"Frequency table;1.0;;;1.0;{w!r};{a!r};{b!r};25.0".replace(".", ","))
     out, _ = imported(tmp_path, "a.csv", rows)
     ex.assert_curve(out, 3.0)
-    assert_sweep(out / "lve.csv")
+    ex.assert_sweep(out / "lve.csv")
 
 
 def test_segments_of_rheowin_are_told_apart_by_their_number(tmp_path):
@@ -156,7 +141,7 @@ def test_files_of_reptate_are_what_their_suffix_says(tmp_path):
     for name, rows in files.items():
         (tmp_path / name).write_text("\n".join(rows))
     out, _ = run(tmp_path, *(tmp_path / name for name in files))
-    assert_sweep(out / "lve.csv")
+    ex.assert_sweep(out / "lve.csv")
     data = load_dataset(out)
     np.testing.assert_allclose(data["b.csv"].stress, 2 * TIMES, rtol=EXACT)
     np.testing.assert_allclose(data["b.csv"].rate, 0.5)
@@ -192,7 +177,7 @@ def test_real_exports_of_trios_are_what_their_steps_are_called(measured_data, tm
 def test_a_rate_that_alternates_is_not_taken_for_a_strain_without_a_name(tmp_path):
     time = np.linspace(0.0, 12.0, 300)
     stress = np.cos(time) + np.sin(time) - np.exp(-time)  # from rest, Maxwell, De = 1
-    test = exported(tmp_path, "time_s,shear_rate_1_s,stress_Pa", time, np.cos(time), stress).run
+    test = ex.exported(tmp_path, "time_s,shear_rate_1_s,stress_Pa", time, np.cos(time), stress).run
     np.testing.assert_allclose(test.rate, np.cos(time), rtol=EXACT)
     assert "start" not in test.metadata
 
@@ -215,19 +200,19 @@ def test_a_sine_of_stress_is_imposed_and_its_start_is_seen_in_the_strain(tmp_pat
     strain = 0.1 * np.sin(time) - 0.3 * np.cos(time) + 0.03 * np.sin(3 * time)
     if at_rest:
         strain += 0.3 * np.exp(-time / 5.0)  # what starts from zero and fades
-    test = exported(tmp_path, "time_s,stress_Pa,strain", time, np.sin(time), strain).run
+    test = ex.exported(tmp_path, "time_s,stress_Pa,strain", time, np.sin(time), strain).run
     assert test.protocol.control == "stress"
     assert ("start" in test.metadata) is not at_rest
 
 
 def test_an_amplitude_sweep_without_a_frequency_says_where_to_write_it(tmp_path):
-    head, columns = "strain_percent,Gp_Pa,Gpp_Pa", (100 * STRAINS, *softening(STRAINS))
-    out, result = exported(tmp_path, head, *columns)
+    head, columns = "strain_percent,Gp_Pa,Gpp_Pa", (100 * STRAINS, *ex.softening(STRAINS))
+    out, result = ex.exported(tmp_path, head, *columns)
     assert "amplitude_sweep_rad_s" in result.stdout
     told = ex.table(out / "amplitude_sweep.csv")
     np.testing.assert_allclose(told["strain"], STRAINS, rtol=EXACT)
-    exported(tmp_path, ["Frequency [rad/s]: 10", head], *columns, options=["--overwrite"])
-    assert_softening(out / "amplitude_sweep.csv")
+    ex.exported(tmp_path, ["Frequency [rad/s]: 10", head], *columns, options=["--overwrite"])
+    ex.assert_softening(out / "amplitude_sweep.csv")
 
 
 def test_a_radius_a_gap_and_a_rate_of_the_header_are_used(tmp_path):
@@ -311,7 +296,7 @@ def test_what_follows_a_steady_flow_starts_from_it(tmp_path):
 def test_oscillations_that_nothing_is_fitted_to_are_said_not_taken(tmp_path, said, degrees):
     head = ["Time,Angular frequency,Strain,G',G'',Temperature", "s,rad/s,%,Pa,Pa,°C"]
     columns = TIMES[:13], 10.0, 1.0, *moduli(OMEGA), degrees
-    out, result = exported(tmp_path, head, *columns, code=2)
+    out, result = ex.exported(tmp_path, head, *columns, code=2)
     assert said in result.stderr
     assert "--test" in result.stderr
     assert not out.exists()
@@ -320,10 +305,10 @@ def test_oscillations_that_nothing_is_fitted_to_are_said_not_taken(tmp_path, sai
 def test_a_rise_of_the_rate_in_time_is_a_run_where_the_user_says_so(tmp_path):
     head = ["Time,Shear rate,Shear stress", "s,1/s,Pa"]
     columns = np.arange(1.0, 12.0), RATES, RATES
-    out, result = exported(tmp_path, head, *columns)
+    out, result = ex.exported(tmp_path, head, *columns)
     assert (out / "flow_curve.csv").exists()
     assert "every row has another rate" in result.stdout
-    exported(tmp_path, head, *columns, options=("--test", "run", "--overwrite"))
+    ex.exported(tmp_path, head, *columns, options=("--test", "run", "--overwrite"))
     assert load_dataset(out).names == ("a.csv",)
 
 
@@ -331,7 +316,7 @@ def test_moduli_follow_from_their_size_and_angle(tmp_path):
     a, b = moduli(OMEGA)
     head = ["Frequency,Complex viscosity,Phase angle", "Hz,Pa.s,°"]
     columns = OMEGA / (2 * np.pi), np.hypot(a, b) / OMEGA, np.degrees(np.arctan2(b, a))
-    found = ex.table(exported(tmp_path, head, *columns).folder / "lve.csv")
+    found = ex.table(ex.exported(tmp_path, head, *columns).folder / "lve.csv")
     # arctan and back costs some roundings of the smaller modulus
     np.testing.assert_allclose(found["Gp_Pa"], a, rtol=1e-10)
     np.testing.assert_allclose(found["Gpp_Pa"], b, rtol=1e-10)

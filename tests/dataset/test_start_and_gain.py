@@ -107,12 +107,16 @@ def test_a_start_up_whose_rise_was_not_recorded_does_not_show_a_start_from_rest(
         assert about(write(tmp_path, *runs, linear=False), "start") == []
 
 
+def slow_start_ups(gains):
+    """Start-ups at four low rates, each recorded with its gain."""
+    runs = [giesekus(START_UP, start_up(rate)) for rate in (0.02, 0.06, 0.2, 0.5)]
+    pairs = zip(runs, gains, strict=True)
+    return [{**run, "stress_Pa": gain * run["stress_Pa"]} for run, gain in pairs]
+
+
 @pytest.mark.parametrize("gain", [0.88, 1.15])
 def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
-    runs = [giesekus(START_UP, start_up(r)) for r in (0.02, 0.06, 0.2, 0.5)]
-    for run in runs:
-        run["stress_Pa"] = gain * run["stress_Pa"]
-    (said,) = about(write(tmp_path, *runs), "gain")
+    (said,) = about(write(tmp_path, *slow_start_ups(4 * [gain])), "gain")
     found = float(said.split("small strain is ")[1].split()[0])
     assert found == pytest.approx(gain, abs=0.02)
     assert 'modulus_Pa = "fit"' in said
@@ -140,17 +144,14 @@ def test_no_gain_is_said_of_runs_that_lag_agree_start_slowly_or_disagree_each_in
     run = oscillation(0.05)
     late = giesekus(CYCLES, wave(0.05 * OMEGA, OMEGA, -0.5))
     assert about(write(tmp_path, {**run, "stress_Pa": late["stress_Pa"]}), "gain") == []
-    runs = [giesekus(START_UP, start_up(r)) for r in (0.02, 0.06, 0.2, 0.5)]
-    assert about(write(tmp_path, *runs), "gain") == []
+    assert about(write(tmp_path, *slow_start_ups(4 * [1.0])), "gain") == []
     # a rate that rises within 1 s lowers the early stress, less and less
     runs = []
     for rate in (0.1, 0.2, 0.5):
         run = giesekus(START_UP, of_rate(lambda t, r=rate: r * -np.expm1(-t / 1.0), 20.0))
         runs.append({**run, "shear_rate_1_s": np.full(len(START_UP), rate)})
     assert about(write(tmp_path, *runs), "gain") == []
-    runs = [giesekus(START_UP, start_up(r)) for r in (0.02, 0.06, 0.2, 0.5)]
-    for run, gain in zip(runs, (0.85, 1.12, 0.9, 1.2), strict=True):
-        run["stress_Pa"] = gain * run["stress_Pa"]
+    runs = slow_start_ups((0.85, 1.12, 0.9, 1.2))
     assert about(write(tmp_path, *runs), "gain") == []
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import typer.main
+from user_packages import blocks
 
 import discover
 import tensor_library
@@ -22,10 +23,6 @@ from discover.study.schema import Study
 ROOT = Path(__file__).parents[2]
 OF_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md")
 PAGES = [*(ROOT / name for name in OF_THE_ROOT), *sorted((ROOT / "docs").glob("*.md"))]
-
-
-def blocks(page, language):
-    return re.findall(rf"^```{language}\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.S | re.M)
 
 
 def test_the_page_on_effects_names_neighbours_that_exist():
@@ -119,13 +116,13 @@ def test_packages_say_that_they_are_typed(package):
 
 
 def test_a_study_file_of_the_tutorial_is_a_study(tmp_path):
-    for i, text in enumerate(blocks("docs/tutorial.md", "toml")):
+    for i, text in enumerate(blocks("tutorial.md", "toml")):
         (tmp_path / f"{i}.toml").write_text(text)
         read_study(tmp_path / f"{i}.toml")
 
 
 def test_the_batch_script_for_a_cluster_is_python():
-    for text in blocks("docs/batches.md", "python"):
+    for text in blocks("batches.md", "python"):
         ast.parse(text)
 
 
@@ -163,7 +160,7 @@ def test_pages_of_keys_and_effects_are_those_of_schema_and_dictionary_and_say_wh
 
 
 def test_the_ten_answers_run():
-    page = "docs/ten-questions.md"
+    page = "ten-questions.md"
     known = set(LAWS.present)
     names = {}
     try:
@@ -172,7 +169,9 @@ def test_the_ten_answers_run():
     finally:
         for name in set(LAWS.present) - known:
             del LAWS[name]
-    assert len(re.findall(r"^## \d+\. .*\?$", (ROOT / page).read_text("utf-8"), re.M)) == 10
+    assert (
+        len(re.findall(r"^## \d+\. .*\?$", (ROOT / "docs" / page).read_text("utf-8"), re.M)) == 10
+    )
     assert (names["errors"] > 0.0).all()
     assert "The misfit is systematic" in names["answer"]  # the runs were made with another α
     assert names["loop"].verdict == "effects_added"

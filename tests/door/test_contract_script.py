@@ -1,12 +1,11 @@
 """The script of the page on Python runs as it stands."""
 
-import re
 from functools import partial
-from pathlib import Path
 
 import pytest
 from fewer_hypotheses import few_candidates, verdict_alone, without_pictures
 from independent_folder import MOBILITY, write_folder
+from user_packages import blocks
 
 import discover as dc
 from discover.learners.tbnn_ude import DefaultRecipe
@@ -16,13 +15,11 @@ from discover.loop import in_memory
 from tensor_library import parse_term
 from tensor_library.library import TermLibrary
 
-PAGE = Path(__file__).parents[2] / "docs" / "python.md"
 LIBRARY = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
 
 
 def script():
-    return re.search(r"^```python\n(import discover as dc.*?)^```", PAGE.read_text("utf-8"),
-                     re.S | re.M)[1]  # fmt: skip
+    return next(b for b in blocks("python.md", "python") if b.startswith("import discover as dc"))
 
 
 # constants alone, which is all that these data need: functions have tests of their own

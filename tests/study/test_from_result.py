@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from independent import multimode_giesekus
 from independent import start_up as independent_start_up
+from noisy_runs import sweep as sweep_of
 
-from discover.dataset import Dataset, LinearSweep, Run
+from discover.dataset import Dataset, Run
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
@@ -239,18 +240,10 @@ def test_a_result_that_is_not_finished_or_not_there_and_a_law_beside_it_are_refu
         declared(file)
 
 
-def sweep_of(moduli, times):
-    """A sweep of these modes with an error of a tenth of a per cent that no modes have."""
-    omega = np.geomspace(0.01, 100.0, 30)
-    x = np.multiply.outer(omega, times)
-    wrong = 1.0 + 1e-3 * np.sin(7.0 * np.arange(30))
-    storage = wrong * ((x**2 / (1 + x**2)) @ np.array(moduli))
-    return LinearSweep(omega, storage, (x / (1 + x**2)) @ np.array(moduli))
-
-
 def test_modes_of_the_sweep_keep_its_error_and_other_modes_have_none(tmp_path):
     """A result holds modes alone, and intervals that ignore their errors would be too narrow."""
-    sweep = sweep_of([90.0, 40.0], [1.0, 0.1])
+    # an error of a tenth of a per cent that no modes have
+    sweep = sweep_of([90.0, 40.0], [1.0, 0.1], noise=1e-3)
     data, spectrum = replace(DATA, linear_sweep=sweep), relaxation_spectrum(sweep)
     rows = [
         {"modulus_Pa": 0.9 * g, "relaxation_time_s": t}

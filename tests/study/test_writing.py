@@ -8,7 +8,9 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import typer
@@ -108,7 +110,8 @@ def test_a_full_disk_and_an_interrupt_while_writing_are_one_line_and_keep_what_w
     def work() -> None:
         with monkeypatch.context() as patch:
             if step == "write":
-                patch.setattr("discover.study.atomic.os.fdopen", lambda *a, **k: _FullDisk(stop))
+                full = nullcontext(SimpleNamespace(write=stop))
+                patch.setattr("discover.study.atomic.os.fdopen", lambda *a, **k: full)
             else:
                 patch.setattr(os, step, stop)
             folder.save("part", {"x": 2})
@@ -121,17 +124,6 @@ def test_a_full_disk_and_an_interrupt_while_writing_are_one_line_and_keep_what_w
     assert all(word in result.stderr for word in words)
     assert folder.load("part") == before
     assert not list(tmp_path.rglob(f"*{PART_SUFFIX}"))
-
-
-class _FullDisk:
-    def __init__(self, write):
-        self.write = write
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return False
 
 
 # the module alone: the package would import much before the first write
@@ -242,15 +234,15 @@ def test_a_name_as_long_as_a_name_may_be_is_written(tmp_path):
     assert sorted(len(os.fsencode(path.name)) for path in tmp_path.iterdir()) == [254, 255]
 
 
-def link(path):
-    path.symlink_to(path.with_name("target"))
+NO_PLAIN_FILES = {
+    "link": lambda path: path.symlink_to(path.with_name("target")),
+    "dangling link": lambda path: path.symlink_to(path.with_name("nowhere")),
+    "pipe": os.mkfifo,
+    "folder": os.mkdir,
+}
 
 
-def dangling_link(path):
-    path.symlink_to(path.with_name("nowhere"))
-
-
-@pytest.mark.parametrize("make", [link, dangling_link, os.mkfifo, os.mkdir])
+@pytest.mark.parametrize("make", NO_PLAIN_FILES.values(), ids=NO_PLAIN_FILES)
 def test_what_is_no_plain_file_is_not_replaced(tmp_path, make):
     (tmp_path / "target").write_text("theirs")
     make(tmp_path / "law.py")
