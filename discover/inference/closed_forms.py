@@ -126,6 +126,6 @@ def _relaxing(
     """Return the stress over the modulus of a Maxwell mode, exact for a rate linear in steps."""
     step = np.diff(times, prepend=0.0)
     before = np.concatenate([rates[:1], rates[:-1]])
-    kept = np.exp(-step / time)
-    gained = 0.5 * (before + rates) * time * (-np.expm1(-step / time))
-    return first_order(kept, gained)
+    kept, lost = np.exp(-step / time), -np.expm1(-step / time)
+    slope = np.divide(rates - before, step, out=np.zeros(len(step)), where=step > 0.0)
+    return first_order(kept, time * (before * lost + slope * (step - time * lost)))

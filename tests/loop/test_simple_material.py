@@ -16,7 +16,7 @@ from discover.inference.closed_forms import recorded
 from discover.inference.simple_materials import SimpleFit
 from discover.loop import run_loop
 from discover.loop.simple import check_of
-from discover.protocols import imposed_stress, steady_rates
+from discover.protocols import imposed_stress, measured_rate, steady_rates
 from discover.protocols import oscillations as oscillations_of
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
@@ -71,6 +71,15 @@ def crept(times, stress, strain):
 def material_in(runs, modulus=1.0) -> SimpleMaterial | None:
     declared = DeclaredModel.named("ucm", {}, [modulus], [1.0])
     return run_loop(Dataset("runs", tuple(runs)), declared, effects=FEW, max_effects=1).material
+
+
+def test_a_maxwell_mode_is_exact_in_long_steps_of_a_rate_that_grows_evenly():
+    times = np.array([0.0, 3.0, 4.0, 9.0])  # steps of one and a half to six relaxation times
+    run = Run("ramp", times, measured_rate(times, times), times, np.ones(4))
+    stress = recorded("maxwell", (10.0, 1.5, 0.0), run)
+    # G λ (t − λ (1 − exp(−t/λ))): the integral of the rate t, faded
+    exact = 10.0 * 1.5 * (times + 1.5 * np.expm1(-times / 1.5))
+    np.testing.assert_allclose(stress, exact, rtol=1e-12)  # rounding
 
 
 @pytest.mark.parametrize(
