@@ -59,9 +59,7 @@ def fit_classical_laws(
         effects[name] for name in best.names if not isinstance(effects[name], ConstitutiveEffect)
     ]  # fmt: skip
     tried = _added_to_ucm(found, bench)
-    for name in dict.fromkeys(further):
-        if name not in tried:
-            tried[name] = _of_law(found, name, bench)
+    tried |= {name: _of_law(found, name, bench) for name in further if name not in tried}
     least = min(
         (-2.0 * fit.log_evidence for _, fit in tried.values() if _is_sound(fit)), default=0.0
     )

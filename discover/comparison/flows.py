@@ -17,6 +17,7 @@ from discover.equations import law_terms
 from discover.errors import InputError
 from discover.forward.of_fluids import recorded_and_normal
 from discover.laws import Fluid, make_law
+from discover.learners.files import kept_in_files
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
@@ -51,7 +52,6 @@ class Flow:
 
     `times`, `shear_rate`: in s and 1/s, shape (n,). `reference`: the truth where the law is known,
     else the measurement; not every quantity. `measured`: σ12 of training flows, noise included.
-    `training_end`: last time of the training series, or None.
     """
 
     name: str  # name of the run or of the protocol
@@ -62,8 +62,6 @@ class Flow:
     reference: Stresses
     measured: Float[np.ndarray, " n"] | None = None
     is_truth: bool = False  # whether `reference` is exact and not a measurement
-    training_end: float | None = None
-    oscillatory: bool = False  # whether Lissajous curves make sense
 
     @property
     def key(self) -> str:
@@ -94,6 +92,22 @@ class Flow:
     def records_strain(self) -> bool:
         """Whether the stress is imposed, as in creep, and the strain is recorded."""
         return self.protocol.quantity == "strain"
+
+    @property
+    def training_end(self) -> float | None:
+        """Last time of the training series in s; None where there is none."""
+        if self.kind == "test":
+            return TRAINING_DURATION
+        in_time = self.kind == "training" and not self.is_of_states
+        return float(self.times[-1]) if in_time else None
+
+    @property
+    def oscillatory(self) -> bool:
+        """Whether Lissajous curves make sense."""
+        if self.protocol.control != "rate":  # the slope of a noisy strain changes its sign
+            return False
+        changes = np.count_nonzero(np.diff(np.sign(self.rate[np.abs(self.rate) > 0])))
+        return bool(np.any(np.asarray(self.protocol.amplitudes)) or changes >= 3)
 
     @property
     def drawn(self) -> tuple[str, Float[np.ndarray, " n"]]:
@@ -163,6 +177,7 @@ class Flow:
         return self.name
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class FlowBand:
     """σ12 (or what is recorded), N1 and N2 of one flow with their limits, in Pa.
@@ -216,19 +231,16 @@ def comparison_flows(
     truth = data.truth
     if truth is None:
         return flows
+    times = np.linspace(0.0, TEST_DURATION, 401)
     for name, protocol in protocols.paper_test_protocols().items():
-        times = np.linspace(0.0, TEST_DURATION, 401)
         flows.append(_truth_flow(name, "test", protocol, times, truth))
     for deborah in high_deborah:
         protocol = protocols.oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
-        times = _late_cycle(deborah)
-        flows.append(
-            _truth_flow(f"high_deborah_{deborah:g}", "high_deborah", protocol, times, truth)
-        )
+        name, times = f"high_deborah_{deborah:g}", _late_cycle(deborah)
+        flows.append(_truth_flow(name, "high_deborah", protocol, times, truth))
     for weissenberg, deborah in pipkin:
         protocol = protocols.oscillatory_shear(weissenberg, deborah)
-        times = _late_cycle(deborah, samples=61)
-        name = f"pipkin_{weissenberg:g}_{deborah:g}"
+        name, times = f"pipkin_{weissenberg:g}_{deborah:g}", _late_cycle(deborah, samples=61)
         flows.append(_truth_flow(name, "pipkin", protocol, times, truth))
     return flows
 
@@ -255,29 +267,15 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData, sound: Mapping[str, Run]
             if own.name in sound:
                 there = np.isin(own.time, sound[own.name].time)
                 reference[own.quantity] = np.where(there, own.recorded, np.nan)
-    of_states = run.protocol.control in STATES
+    measured = run.recorded if kind == "training" else None
     return Flow(
-        run.name, kind, run.protocol, run.time, run.rate, reference,
-        run.recorded if kind == "training" else None, is_truth=exact is not None,
-        training_end=float(run.time[-1]) if kind == "training" and not of_states else None,
-        oscillatory=_oscillates(run.protocol, run.rate),
-    )  # fmt: skip
+        run.name, kind, run.protocol, run.time, run.rate, reference, measured, exact is not None
+    )
 
 
 def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
     rates, reference = protocols.shear_rates(protocol, times), observe(truth, protocol, times)
-    return Flow(
-        name, kind, protocol, times, rates, columns_of(reference), is_truth=True,
-        training_end=TRAINING_DURATION if kind == "test" else None,
-        oscillatory=_oscillates(protocol, rates),
-    )  # fmt: skip
-
-
-def _oscillates(protocol: protocols.FlowProtocol, rates: np.ndarray) -> bool:
-    if protocol.control != "rate":  # the slope of a noisy strain changes its sign at any time
-        return False
-    changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
-    return bool(np.any(np.asarray(protocol.amplitudes)) or changes >= 3)
+    return Flow(name, kind, protocol, times, rates, columns_of(reference), is_truth=True)
 
 
 def columns_of(observed: Float[np.ndarray, "n 3"]) -> dict[str, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -26,14 +27,16 @@ from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study
 from tensor_library import LawTerm, TermLibrary
 
+_EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
 _EFFECTS = {
     "sigma.sigma": ("giesekus_mobility", 1.0),
     "sigma.gammadot+gammadot.sigma": ("non_affine_motion", 2.0),
     "tr(sigma)*sigma": ("ptt_linear", 1.0),
+    _EXPONENTIAL: ("ptt_exponential", 1.0),
 }
-"""Terms that are effects with a name, and the constant of the effect over the coefficient."""
+"""Terms that are effects with a name, and the constant of the effect over the coefficient, or over
+the inner constant."""
 
-_EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
 _NEAR = 0.3
 """Distance of a coefficient from one within which the exponential term is exponential PTT."""
 
@@ -48,17 +51,12 @@ def search_hypotheses(
     Candidates are every named effect, of fluid and instrument, and every library term. What of the
     known part is to be fitted is fitted with every hypothesis. `say`: takes a line of text.
     """
-    dataset = data.dataset
-    runs = {run.name: run for run in dataset.runs}
-    fit = list(data.fit.names)
+    dataset, fit = data.dataset, list(data.fit.names)
     if study.compare.use_normal_stresses:
-        for name in data.fit.names:
-            for quantity in runs[name].also_recorded:
-                also = runs[name].observing(quantity)
-                dataset = replace(dataset, runs=(*dataset.runs, also))
-                fit.append(also.name)
-    known = {effect.name for effect in declared.effects}
-    named = [e for e in named_effects().values() if not e.on_request and e.name not in known]
+        also = [run.observing(quantity) for run in data.fit for quantity in run.also_recorded]
+        dataset = replace(dataset, runs=(*dataset.runs, *also))
+        fit += [run.name for run in also]
+    named = [effect for effect in named_effects().values() if not effect.on_request]
     terms = [
         library_term(term)
         for term in library.terms
@@ -98,54 +96,49 @@ def with_proposals(
     best = alive[0]
     of_fluid = [n for n in best.names if isinstance(problem.effects[n], ConstitutiveEffect)]
     bench = [name for name in best.names if name not in of_fluid]
-    keys, starts = {}, []
+    keys: dict[str, frozenset[str]] = {}
+    starts: dict[frozenset[str], Fit] = {}
     for learner, some in terms.items():
         values = _as_effects(some, problem.effects)
         if values is None:
             continue
         theta = problem.without(best.theta, *of_fluid)
         for name, value in values.items():
-            theta[problem.model.positions(name)] = value
-        names = tuple(sorted({*values, *bench}))
-        keys[learner] = frozenset(names)
-        if keys[learner] not in search.found and keys[learner] not in {
-            frozenset(start.names) for start in starts
-        }:
-            starts.append(search.fitter.start(names, theta, best.linear))
-    search.add(starts)
-    if any(np.isfinite(search.found[frozenset(s.names)].log_evidence) for s in starts):
+            theta[problem.model.positions(name)[0]] = value
+        keys[learner] = key = frozenset({*values, *bench})
+        if key not in search.found:
+            starts.setdefault(key, search.fitter.start(tuple(sorted(key)), theta, best.linear))
+    search.add(starts.values())
+    if any(np.isfinite(search.found[key].log_evidence) for key in starts):
         found = replace(found, posterior=posterior_of(search, found.posterior))
     shares = {frozenset(fit.names): share for fit, share in found.posterior.fits}
-    proposed = {}
-    for learner, some in terms.items():
-        fit = search.found.get(keys[learner]) if learner in keys else None
-        if fit is None or fit.covariance is None or not np.isfinite(fit.log_posterior):
-            proposed[learner] = Proposed(tuple(some))
-            continue
-        share = shares.get(keys[learner], 0.0)
-        proposed[learner] = Proposed(_refitted(some, fit, found), share)
+    proposed = {name: Proposed(tuple(some)) for name, some in terms.items()}
+    for learner, key in keys.items():
+        fit = search.found[key]
+        if fit.covariance is not None and np.isfinite(fit.log_posterior):
+            own = _refitted(terms[learner], fit, found)
+            proposed[learner] = Proposed(own, shares.get(key, 0.0))
     return found, proposed
 
 
 def _as_effects(
     terms: Sequence[RecoveredTerm], effects: Mapping[str, AbstractEffect]
-) -> dict[str, list[float]] | None:
-    """Return constants of the effects that terms are, by name; None where one is no effect."""
+) -> dict[str, float] | None:
+    """Return the constant of each effect that terms are, by name; None where one is no effect."""
     found = {}
     for term in terms:
         name, factor = _EFFECTS.get(term.term, (term.term, 1.0))
-        values = [factor * term.coefficient]
+        value = factor * term.coefficient
         if term.term == _EXPONENTIAL:
             if abs(term.coefficient - 1.0) > _NEAR:
                 return None
-            name, values = "ptt_exponential", [term.inner["epsilon"]]
+            value = term.inner["epsilon"]
         effect = effects.get(name)
-        if effect is None or len(effect.parameters) != len(values):
+        if effect is None or len(effect.parameters) != 1:
             return None
-        pairs = zip(effect.parameters, values, strict=True)
-        if any(not p.low <= value <= p.high for p, value in pairs):
+        if not effect.parameters[0].low <= value <= effect.parameters[0].high:
             return None
-        found[name] = values
+        found[name] = value
     return found
 
 
@@ -157,17 +150,14 @@ def _refitted(
     assert fit.covariance is not None
     for term in terms:
         name, factor = _EFFECTS.get(term.term, (term.term, 1.0))
-        name = "ptt_exponential" if term.term == _EXPONENTIAL else name
         at = model.positions(name)[0]
         low, high = (end / factor for end in fit.interval(at))
         value = float(fit.theta[at]) / factor
+        own: dict[str, Any] = {"coefficient": value, "ci95": (low, high)}
         if term.term == _EXPONENTIAL:
-            inner = {"epsilon": value}
-            out.append(
-                replace(term, coefficient=1.0, inner=inner, inner_ci95={"epsilon": (low, high)})
-            )
-        else:
-            out.append(replace(term, coefficient=value, ci95=(low, high)))
+            inner, ends = {"epsilon": value}, {"epsilon": (low, high)}
+            own = {"coefficient": 1.0, "inner": inner, "inner_ci95": ends}
+        out.append(replace(term, **own))
     return tuple(out)
 
 
@@ -193,7 +183,6 @@ def terms_of(fit: Fit, found: SearchOutcome) -> tuple[LawTerm, ...] | None:
 def terms_named(effects: Iterable[str]) -> set[str]:
     """Return the names of the terms that effects are; an effect that is no term has its own."""
     terms = {effect: term for term, (effect, _) in _EFFECTS.items()}
-    terms["ptt_exponential"] = _EXPONENTIAL
     return {terms.get(effect, effect) for effect in effects}
 
 

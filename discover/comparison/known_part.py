@@ -18,6 +18,7 @@ from discover.comparison.flows import (
 )
 from discover.comparison.outcome import LearnerOutcome, simulated
 from discover.dataset import Run
+from discover.dataset.run import COLUMN_OF
 from discover.effects import ConstitutiveEffect, KnownEffect, StateEffect
 from discover.errors import InputError
 from discover.forward import make_batch
@@ -182,9 +183,6 @@ def _dated(ended: FinishedSearch, data: StudyData) -> StudyData:
     return with_each_run(data, dated) if steps else data
 
 
-_NORMAL = ("first_normal_stress_difference", "second_normal_stress_difference")
-
-
 def without_instrument(
     data: StudyData,
     ended: FinishedSearch,
@@ -228,12 +226,10 @@ def without_instrument(
         own = by_run.get(run.name)
         if own is None:
             return run
-        normal = {
-            name: values - own[quantity]
-            for name, quantity in zip(_NORMAL, ("N1", "N2"), strict=True)
-            if (values := getattr(run, name)) is not None
-        }
-        stress = run.stress - own["sigma12"] if run.quantity == "sigma12" else run.stress
-        return replace(run, stress=stress, **normal)
+        there = [q for q in ("N1", "N2") if getattr(run, COLUMN_OF[q]) is not None]
+        if run.quantity == "sigma12":
+            there.append("sigma12")
+        columns = [(COLUMN_OF[quantity], own[quantity]) for quantity in there]
+        return replace(run, **{name: getattr(run, name) - added for name, added in columns})
 
     return with_each_run(data, undone), by_run

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Event, Lock
 from typing import TypeVar
 
@@ -12,10 +13,10 @@ from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome, bands_of_members, physics_of, simulated
 from discover.dataset.run import Run
 from discover.laws import Fluid
+from discover.learners.files import plain, restored
 from discover.learners.lack_of_fit import LackOfFit, lack_of_fit
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
-from discover.plain_numbers import plain
 from discover.progress import Progress, Stopped, may_be_stopped, silent
 from discover.study.declared_model import StudyModel
 from discover.study.run_folder import RunFolder
@@ -32,31 +33,29 @@ def train(
     `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `model`: the known
     part.
     """
-    options = study.compare
-    library = study_library(study)
+    options, library = study.compare, study_library(study)
     if learner == "tensor_sindy":
         from discover.learners.tensor_sindy import TensorSINDy
 
-        sparse = TensorSINDy(
+        estimator = TensorSINDy(
             base=replace(model.fluid, modulus_covariance=model.modulus_covariance),
             library=library,
             optimizer=options.optimizer,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
-        ).fit(list(runs))
-        return sparse.result_, sparse.fluid_
-    if learner == "tbnn_ude":
+        )
+    elif learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 
         estimator = TBNNUDE(
             base=model.fluid, recipe=options.recipe, n_members=options.members, quick=options.quick,
             projection_library=library, progress=progress, random_state=seed,
         )  # fmt: skip
-        estimator.fit(list(runs))
-        return estimator.result_, estimator.fluid_
-    asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)
-    return learn_with(learner, asked)
+    else:
+        return learn_with(learner, LearningTask(tuple(runs), model.fluid, library, seed, progress))
+    estimator.fit(list(runs))
+    return estimator.result_, estimator.fluid_
 
 
 def study_library(study: Study) -> TermLibrary:
@@ -81,34 +80,32 @@ class Learning:
         # before the threads: two that load scikit-learn at once find it half loaded
         from discover.learners import tbnn_ude, tensor_sindy  # noqa: F401
 
-        def part(learner: str) -> Callable[[Progress], LearnerOutcome]:
-            return lambda say: self.outcome(learner, frame, say)
-
         ours = [one for one in learners if one in BUILT_IN]
         others = [[one] for one in learners if one not in BUILT_IN]
         found: dict[str, LearnerOutcome] = {}
-        for group in [ours, *others] if ours else others:
+        for group in filter(None, [ours, *others]):
             done, share = len(found) / len(learners), len(group) / len(learners)
 
             def say(text: str, fraction: float, done: float = done, share: float = share) -> None:
                 progress(text, done + share * fraction)
 
-            found |= run_concurrently({learner: part(learner) for learner in group}, say)
+            parts = {learner: partial(self.outcome, learner, frame) for learner in group}
+            found |= run_concurrently(parts, say)
         return {learner: found[learner] for learner in learners}
 
     def outcome(self, learner: str, frame: Frame, progress: Progress) -> LearnerOutcome:
         """Return what a learner finds, in the frame in which it works."""
         store, made, flows = self.store, self.made, frame.flows
         kept = None if store is None else store.load(learner)
-        if kept is not None and all(flow.key in kept["predictions"] for flow in flows):
-            return LearnerOutcome.from_state(kept)
+        found = None if kept is None else restored(kept)
+        if found is not None and all(flow.key in found.predictions for flow in flows):
+            return found
         progress("starting", 0.0)
         if made is not None:
             result, fluid = made[learner]
         else:
-            result, fluid = train(
-                learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
-            )
+            runs = frame.data.fit.runs
+            result, fluid = train(learner, self.study, frame.model, runs, self.seed, progress)
         predictions = simulated(fluid, flows)
         outcome = LearnerOutcome(
             result.learner, result.terms, result.train_seconds, result.details, result.message,
@@ -116,10 +113,7 @@ class Learning:
             bands_of_members(result, fluid, flows, predictions), self._left(fluid, frame),
         )  # fmt: skip
         if store is not None:
-            state = plain(outcome)
-            store.save(learner, state)
-            # the same route as after an interruption, so that both give the same files
-            return LearnerOutcome.from_state(state)
+            store.save(learner, plain(outcome, f"What {learner} found"))
         return outcome
 
     def _left(self, fluid: Fluid, frame: Frame) -> LackOfFit | None:

@@ -12,10 +12,12 @@ from discover.forward import make_batch
 from discover.forward.of_fluids import bare_run, followed, observed, pieces_in_time
 from discover.laws import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.files import kept_in_files
 from discover.learners.lack_of_fit import LackOfFit
 from discover.learners.results import TermTables
 
 
+@kept_in_files
 @dataclass(frozen=True)
 class LearnerOutcome(TermTables):
     """Result of a learner with its predictions in every flow of the comparison.
@@ -34,28 +36,6 @@ class LearnerOutcome(TermTables):
     physics: Mapping[str, Any] | None = None
     bands: Mapping[str, FlowBand] = field(default_factory=dict)
     left: LackOfFit | None = None  # of the runs that it learned from
-
-    @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
-        """Return an outcome of its JSON-able values."""
-
-        def arrays(values: Mapping[str, Any]) -> dict[str, np.ndarray]:
-            return {name: np.asarray(one, dtype=float) for name, one in values.items()}
-
-        predictions, left = state["predictions"], state.get("left")
-        if left is not None:  # JSON has no number that is none
-            known: dict[str, Any] = {key: np.nan if v is None else v for key, v in left.items()}
-            left = LackOfFit(**known)
-        read = {
-            "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
-            "predictions": {key: own and arrays(own) for key, own in predictions.items()},
-            "bands": {
-                key: FlowBand(**{end: arrays(values) for end, values in own.items()})
-                for key, own in state["bands"].items()
-            },
-            "left": left,
-        }
-        return cls(**{**state, **read})
 
 
 def bands_of_members(
@@ -87,31 +67,15 @@ _NUMBERS = {"shear rate": "shear rate (Wi)", "frequency": "frequency (De)"}
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a flow lies against the fitted ones, as factors over their largest.
+    """Where a flow lies against the fitted ones."""
 
-    `frequency`: None where one of the two does not oscillate: a step excites every frequency.
-    """
-
-    rate: float
-    strain: float
-    frequency: float | None
+    beyond: Mapping[str, float]  # what exceeds the fitted flows, as a factor over their largest
     new_flow: str = ""  # which flow it is, where no fitted one is of that kind; empty otherwise
-    rate_name: str = "shear rate"  # what the rate is called in this flow
 
     @property
     def inside(self) -> bool:
         """Whether nothing exceeds the fitted flows, and flows of the kind were fitted."""
         return not (self.beyond or self.new_flow)
-
-    @property
-    def beyond(self) -> dict[str, float]:
-        """What exceeds the fitted flows, by which factor."""
-        factors = {
-            self.rate_name: self.rate,
-            "strain": self.strain,
-            "frequency": self.frequency or 0.0,
-        }
-        return {name: factor for name, factor in factors.items() if factor > MARGIN}
 
     @property
     def text(self) -> str:
@@ -135,17 +99,19 @@ class Placement:
 
 def place(flow: Flow, training: Sequence[Flow]) -> Placement:
     """Return where a flow lies against the fitted ones; slower or smaller flows are inside."""
-    frequencies = [f for other in training if (f := other.frequency) is not None]
     kind = flow.protocol.flow
     alike = [other for other in training if other.protocol.flow == kind]
-    oscillates = flow.frequency is not None and len(frequencies) == len(training)
-    return Placement(
-        _ratio(flow.largest_rate, [f.largest_rate for f in alike or training]),
-        _ratio(_largest(flow.strain), [_largest(f.strain) for f in alike or training]),
-        _ratio(flow.frequency or 0.0, frequencies) if oscillates else None,
-        "" if alike else kind,
-        "shear rate" if kind == "shear" else "Hencky rate",
-    )
+    others, rate_name = alike or training, "shear rate" if kind == "shear" else "Hencky rate"
+    factors = {
+        rate_name: _ratio(flow.largest_rate, [other.largest_rate for other in others]),
+        "strain": _ratio(_largest(flow.strain), [_largest(other.strain) for other in others]),
+    }
+    frequencies = [f for other in training if (f := other.frequency) is not None]
+    # where one of the two does not oscillate there is none: a step excites every frequency
+    if flow.frequency is not None and len(frequencies) == len(training):
+        factors["frequency"] = _ratio(flow.frequency, frequencies)
+    beyond = {name: factor for name, factor in factors.items() if factor > MARGIN}
+    return Placement(beyond, "" if alike else kind)
 
 
 def _largest(values: np.ndarray) -> float:

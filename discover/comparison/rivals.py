@@ -61,33 +61,24 @@ class Rival:
 
 
 def exact_twins(
-    terms: Sequence[LawTerm],
-    model: StudyModel,
-    flows: Sequence[Flow],
-    library: TermLibrary | None = None,
+    terms: Sequence[LawTerm], model: StudyModel, flows: Sequence[Flow], library: TermLibrary
 ) -> list[Rival]:
     """Return laws that give the same σ12 in every shear flow as the law found.
 
     `library`: the terms that were searched; a twin may be outside.
     """
     chosen = LawTerms.of(terms)
-    basis = build_library(degree=1)
-    searched = [] if library is None else list(library.terms)
-    library = basis if library is None else library.extended(basis.terms)
-    seen = [flow for flow in flows if flow.kind == "training"]
-    unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    twins = identify.find_twins(library, chosen, model.law)
+    twins = identify.find_twins(library.extended(build_library(degree=1).terms), chosen, model.law)
     twins = [twin for twin in twins if _concerns_shear(twin, len(chosen.coefficients))]
     if not twins:
         return []
-    reference = _simulate(chosen, model, [*seen, *unseen])
+    reference = _simulate(chosen, model, flows)
     names = list(dict.fromkeys(name for twin in twins for name in twin.law.coefficients))
     found: dict[frozenset[str], Rival] = {}
     for twin in twins[:MOST_RIVALS]:
-        beyond = [name for name in twin.law.coefficients if parse_term(name) not in searched]
-        rival = _rival_of(twin, beyond if searched else [])
-        predictions = _simulate(rival.law, model, [*seen, *unseen], names)
-        judged = with_differences(rival, reference, predictions, seen, unseen)
+        rival = _rival_of(twin, library)
+        predictions = _simulate(rival.law, model, flows, names)
+        judged = with_differences(rival, reference, predictions, flows)
         if judged is not None and (judged.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
             found.setdefault(frozenset(twin.law.coefficients), judged)
     return list(found.values())
@@ -108,15 +99,13 @@ def other_possible_laws(
     asked = [flow_run(flow, found, runs) for flow in flows]
     thetas = [best.theta, *(fit.theta for fit, _, _ in named)]
     told = in_flows(found.posterior.problem.model, thetas, flows, asked)
-    seen = [flow for flow in flows if flow.kind == "training"]
-    unseen = [flow for flow in flows if flow.kind != "training"]
     rivals = []
     for (_, share, terms), predictions in zip(named, told[1:], strict=True):
         law = LawTerms.of(terms)
         if own is not None and law.coefficients.keys() == LawTerms.of(own).coefficients.keys():
             continue
         reason = f"Its probability given these runs is {percent_of(share)}."
-        rival = with_differences(Rival(law, reason), told[0], predictions, seen, unseen)
+        rival = with_differences(Rival(law, reason), told[0], predictions, flows)
         if rival is not None:
             rivals.append(rival)
     return rivals
@@ -128,12 +117,12 @@ def _concerns_shear(twin: identify.Twin, size: int) -> bool:
     return no_larger or max(twin.difference.N1, twin.difference.N2) > EXACT
 
 
-def _rival_of(twin: identify.Twin, beyond: Sequence[str]) -> Rival:
-    place = None
+def _rival_of(twin: identify.Twin, library: TermLibrary) -> Rival:
+    place, reason = None, twin.text
     if twin.separated_by:
         best = max(twin.separated_by, key=lambda s: s.difference)
         place = {"protocol": best.flow, "quantity": best.quantity}
-    reason = twin.text
+    beyond = [name for name in twin.law.coefficients if parse_term(name) not in library.terms]
     if beyond:
         reason += f" Not in the library searched: {', '.join(beyond)}."
     return Rival(twin.law, reason, separated_by=place)
@@ -149,20 +138,21 @@ def _simulate(
     return simulated(fluid, flows)
 
 
-def with_differences(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
+def with_differences(rival: Rival, reference, predictions, flows) -> Rival | None:
     """Return a rival with its differences from the law found; None if it cannot be followed."""
     worst: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     separation, place = 0.0, None
-    for flow in [*seen, *unseen]:
+    for flow in flows:
         chosen, other = reference[flow.key], predictions[flow.key]
         if chosen is None or other is None:
             continue
         for quantity, error in relative_errors(other, chosen).items():
             if error is None:
                 continue
-            if flow in seen or quantity != "sigma12":
+            fitted = flow.kind == "training"
+            if fitted or quantity != "sigma12":
                 worst[quantity] = max(worst[quantity] or 0.0, error)
-            if error > separation and (flow not in seen or quantity != "sigma12"):
+            if error > separation and not (fitted and quantity == "sigma12"):
                 separation, place = error, {"protocol": flow.name, "quantity": quantity}
     if worst["sigma12"] is None:
         return None

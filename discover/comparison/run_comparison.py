@@ -231,7 +231,7 @@ def _with_what_is_open(
     structure = _structure(terms, frame, library, study.compare.use_normal_stresses)
     twins: list[Rival] = []
     if comparison.verdict == "explained":
-        twins = exact_twins(terms, frame.model, frame.flows, library)
+        twins = exact_twins(terms, frame.model, drawn, library)
     others = other_possible_laws(found, drawn, runs)
     spread = comparison.posterior.spread_of_laws
     statements = make_statements(

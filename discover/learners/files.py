@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from discover._version import __version__
@@ -18,12 +19,12 @@ from discover.dataset.run import Run
 from discover.equations import law_parts
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.each_mode import LawOfEachMode
+from discover.laws.each_mode import LawOfEachMode, law_of_each_mode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS, name_of
+from discover.laws.registry import LAWS, make_law, name_of
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from tensor_library import TermLibrary
+from tensor_library import TermLibrary, parse_term
 
 FORMAT, VERSION = "discover estimator", 3
 KIND = "kind"
@@ -70,6 +71,10 @@ def write_estimator(
     partial.write_bytes(gzip.compress(json.dumps(content, ensure_ascii=False).encode()))
     os.replace(partial, path)
     return path
+
+
+DAMAGES = (LookupError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
+"""What `restored` raises of a value that is damaged."""
 
 
 def plain(value: Any, where: str) -> Any:
@@ -138,6 +143,56 @@ def _named_law(law: AbstractConstitutiveLaw, where: str) -> dict[str, Any]:
     name, values = found
     relaxes = law.linear_relaxation
     return {KIND: "named_law", "name": name, "values": values, "linear_relaxation": relaxes}
+
+
+def restored(content: Any) -> Any:
+    """Return the value that `plain` wrote; one of `DAMAGES` is raised where it is damaged."""
+    if not isinstance(content, dict):
+        return content
+    kind = content[KIND]
+    if kind == "array":
+        dtype = np.dtype(content["dtype"])
+        if dtype.kind not in "biuf":  # of texts one alone may fill the memory
+            raise ValueError(f"an array of {dtype}")
+        return np.array(content["numbers"], dtype).reshape(content["shape"])
+    if kind in ("list", "tuple"):
+        items = [restored(item) for item in content["items"]]
+        return items if kind == "list" else tuple(items)
+    if kind == "dict":
+        return {key: restored(item) for key, item in content["items"].items()}
+    if kind == "library":
+        return TermLibrary(tuple(parse_term(name) for name in content["terms"]))
+    if kind == "named_law":
+        law = make_law(content["name"], content["values"])
+        relaxes = bool(content["linear_relaxation"])
+        if law.linear_relaxation == relaxes:
+            return law
+        return dataclasses.replace(law, linear_relaxation=relaxes)
+    if kind == "law_of_each_mode":
+        return law_of_each_mode([make_law(content["name"], one) for one in content["constants"]])
+    fields = {key: restored(item) for key, item in content["fields"].items()}
+    for name, value in fields.items():  # those of modules are JAX's
+        fields[name] = jnp.asarray(value) if isinstance(value, np.ndarray) else value
+    if kind == "network":
+        return _network(restored(content["weights"]), content["width"], content["depth"], fields)
+    return KINDS[kind](**fields)
+
+
+def _network(
+    weights: Sequence[np.ndarray], width: int, depth: int, fields: dict[str, Any]
+) -> TensorBasisNetwork:
+    if not width and not depth and not weights:
+        return TensorBasisNetwork(network=None, **fields)
+    # a network is not made larger than the weights that the file has for it
+    if len(weights) != 2 * (depth + 1) or len(weights[0]) != width:
+        raise ValueError("weights do not fit the network")
+    made = TensorBasisNetwork.initialise(jax.random.key(0), width, depth)
+    dynamic, static = eqx.partition(made.network, eqx.is_array)
+    leaves, structure = jax.tree.flatten(dynamic)
+    if [w.shape for w in weights] != [leaf.shape for leaf in leaves]:
+        raise ValueError("weights do not fit the network")
+    network = eqx.combine(structure.unflatten(map(jnp.asarray, weights)), static)
+    return TensorBasisNetwork(network=network, **fields)
 
 
 @kept_in_files

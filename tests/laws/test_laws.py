@@ -20,8 +20,7 @@ from discover.identify.physics import _extension
 from discover.laws import LAWS, AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, make_law
 from discover.laws.each_mode import law_of_each_mode, with_modes
 from discover.laws.expansion import law_of_terms
-from discover.learners.files import plain
-from discover.learners.load import restored
+from discover.learners.files import plain, restored
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import trajectories

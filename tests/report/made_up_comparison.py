@@ -27,7 +27,7 @@ def flow(name, kind):
     stress, oscillates = np.sin(TIMES), oscillatory_shear(1.0, 1.0)
     measured = stress if kind == "training" else None
     told = {"sigma12": stress}
-    return Flow(name, kind, oscillates, TIMES, np.cos(TIMES), told, measured, oscillatory=True)
+    return Flow(name, kind, oscillates, TIMES, np.cos(TIMES), told, measured)
 
 
 def outcome(learner, number, predicted, verdict="explained"):

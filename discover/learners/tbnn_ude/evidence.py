@@ -114,9 +114,8 @@ def _sensitivities(
     """Return the weights of a law, which of them act, and their derivatives of the residuals."""
     cloud = cloud_of(along, problem)
     moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
-    varies = np.any(np.asarray(law.network_mask) > 0)
-    make = variational.Rebuild.with_network if varies else variational.Rebuild.of_constants
-    rebuild = make(law, moving, constant_scale(cloud))
+    varies = bool(np.any(np.asarray(law.network_mask) > 0))
+    rebuild = variational.Rebuild.of(law, moving, constant_scale(cloud), varies)
     _, jacobian = variational.side_by_side(rebuild.start, rebuild, problem)
     acts = np.asarray(rebuild.moves)
     _, columns = _linearised(problem.records, along.recorded, jacobian)

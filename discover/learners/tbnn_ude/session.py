@@ -162,8 +162,7 @@ class Session:
         cloud = self.cloud(law)
         if not np.all(np.isfinite(np.asarray(cloud.stress))):
             return law
-        make = Rebuild.with_network if network else Rebuild.of_constants
-        rebuild = make(law, tensors, constant_scale(cloud))
+        rebuild = Rebuild.of(law, tensors, constant_scale(cloud), network)
         if prior is None:
             prior = least_squares.reweighted(law, cloud, on_device(strength))
         objective = least_squares.Objective(self.problem, rebuild, cloud, prior)

@@ -77,37 +77,30 @@ class Rebuild(eqx.Module):
     scale: Float[Array, " q"]  # size of each entry's unit, shape (q,)
 
     @classmethod
-    def of_constants(
-        cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
+    def of(
+        cls,
+        law: TensorBasisNetwork,
+        moving: Bool[ArrayLike, "8"],
+        scale: Float[ArrayLike, "8"],
+        with_network: bool,
     ) -> "Rebuild":
-        """Return the vector of the eight constants.
-
-        `law`: the template. `moving`: which of them move. `scale`: unit of each.
-        """
-        n = _count_of(law)
-        positions = on_device(np.arange(n - N_COEFFICIENTS, n))
-        return cls(law, positions, on_device(np.asarray(moving)), on_device(np.asarray(scale)))
-
-    @classmethod
-    def with_network(
-        cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
-    ) -> "Rebuild":
-        """Return the vector of the network's weights, then the eight constants.
+        """Return the vector of the network's weights, where asked for, then the eight constants.
 
         Output weights of tensors that do not move are left out: the length depends on how many
-        move. Parameters as in `of_constants`; `moving` must be known when a program is compiled.
+        move. `law`: the template. `moving`: which constants move; of a network it must be known
+        when a program is compiled. `scale`: unit of each constant.
         """
-        moving = np.asarray(moving)
-        network: Any = places_of(law).network
-        last = network.layers[-1]  # its bias is there: it was made with one
-        idle = np.append(last.weight[~moving], last.bias[~moving])
-        positions = np.setdiff1d(np.arange(_count_of(law)), idle)
-        of_network = np.ones(positions.size - N_COEFFICIENTS)
+        n, weights, moving = _count_of(law), np.zeros(0, int), np.asarray(moving)
+        if with_network:
+            network: Any = places_of(law).network
+            last = network.layers[-1]  # its bias is there: it was made with one
+            idle = np.append(last.weight[~moving], last.bias[~moving])
+            weights = np.setdiff1d(np.arange(n - N_COEFFICIENTS), idle)
         return cls(
             law,
-            on_device(positions),
-            on_device(np.append(of_network > 0, moving)),
-            on_device(np.append(of_network, scale)),
+            on_device(np.append(weights, np.arange(n - N_COEFFICIENTS, n))),
+            on_device(np.append(np.ones(weights.size, bool), moving)),
+            on_device(np.append(np.ones(weights.size), scale)),
         )
 
     @property
