@@ -12,7 +12,7 @@ from scipy.optimize import isotonic_regression
 from discover.errors import InputError
 from discover.programs import on_device
 from discover.protocols.kinematics import STATES
-from discover.protocols.protocol import FlowProtocol
+from discover.protocols.protocol import FlowProtocol, in_table
 
 STRAIN_STEP = 0.1
 """Largest strain of a step by default: the method then errs by about 1e-6 of the stress."""
@@ -228,7 +228,7 @@ def make_grid(
         grown = _grown(anchors, knots, rates, growth, coarsest)
         limits = np.minimum(max_step, np.maximum(limit, grown))
     elif relaxation_time is not None and not np.any(np.asarray(protocol.amplitudes)):
-        at = intensity * _table_rate(anchors, knots, rates)
+        at = intensity * in_table(np, anchors, knots, rates)
         limits = np.minimum(max_step, _settled(anchors, at, limit, relaxation_time / _SURE))
     if steady.size:
         limits[anchors[:-1] < 0.0] = np.inf
@@ -309,7 +309,7 @@ def _grown(
     anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray, growth: float, strain: float
 ) -> Float[np.ndarray, " gaps"]:
     """Return the step that each gap between anchors allows, for the time since a change of rate."""
-    at = _table_rate(anchors, knots, rates)
+    at = in_table(np, anchors, knots, rates)
     size = np.maximum(np.abs(at[1:]), np.abs(at[:-1]))
     changes = np.abs(np.diff(at)) > _CHANGE * size
     ends = np.where(changes, anchors[1:], 0.0)
@@ -336,16 +336,6 @@ def _settled(
     # what is more than it takes to reach them changes nothing
     died_out = np.clip(since / settling_time - 1.0, 0.0, 100.0)
     return np.maximum(limit, np.minimum(steady, limit * np.exp(died_out / _ORDER)))
-
-
-def _table_rate(anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return the rate of a table at anchors; at a jump, the rate after it."""
-    if len(knots) == 1:
-        return np.full(anchors.shape, rates[0])
-    right = np.clip(np.searchsorted(knots, anchors, side="right"), 1, len(knots) - 1)
-    width = knots[right] - knots[right - 1]
-    share = (anchors - knots[right - 1]) / np.where(width > 0.0, width, 1.0)
-    return rates[right - 1] + np.clip(share, 0.0, 1.0) * (rates[right] - rates[right - 1])
 
 
 def make_grids(

@@ -94,17 +94,17 @@ class FlowProtocol(eqx.Module):
     def rate(self, time: Float[Array, ""]) -> Float[Array, ""]:
         """Return γ̇(t) in 1/s, in extension the Hencky rate; at a jump, the value after it."""
         time = jnp.asarray(time)
-        table = _in_table(jnp, time, self.table_times, self.table_rates)
+        table = in_table(jnp, time, self.table_times, self.table_rates)
         waves = self.amplitudes * jnp.cos(self.frequencies * time + self.phases)
         return table + jnp.sum(waves)
 
     def strain_in_table(self, time: Float[Array, ""]) -> Float[Array, ""]:
         """Return the strain that belongs to the table, such as the amplitude of an oscillation."""
         assert self.table_strains is not None
-        return _in_table(jnp, jnp.asarray(time), self.table_times, self.table_strains)
+        return in_table(jnp, jnp.asarray(time), self.table_times, self.table_strains)
 
 
-def _in_table(xp: ModuleType, times: Any, knots: Any, values: Any) -> Any:
+def in_table(xp: ModuleType, times: Any, knots: Any, values: Any) -> Any:
     """Return at times what a table holds, straight between its knots; `xp`: NumPy or JAX's."""
     # interp leaves the value at a repeated abscissa (a jump) undefined
     if knots.size == 1:
@@ -278,7 +278,7 @@ def shear_rates(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float
     # in NumPy, as all below: without a program for each length
     knots, rates, amplitudes, frequencies, phases = _in_numpy(protocol)
     waves = np.cos(np.outer(times, frequencies) + phases) @ amplitudes
-    return _in_table(np, np.asarray(times), knots, rates) + waves
+    return in_table(np, np.asarray(times), knots, rates) + waves
 
 
 def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
@@ -287,7 +287,7 @@ def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.
     at_knots = cumulative_trapezoid(rates, knots, initial=0.0)
     places = np.append(times, 0.0)
     last = np.clip(np.searchsorted(knots, places, side="right") - 1, 0, None)
-    mean = 0.5 * (rates[last] + _in_table(np, places, knots, rates))
+    mean = 0.5 * (rates[last] + in_table(np, places, knots, rates))
     area = at_knots[last] + (places - knots[last]) * mean
     # the integral of a cosine from 0 on, that of a constant too
     half = 0.5 * np.outer(times, frequencies)
@@ -300,7 +300,7 @@ def strains_in_table(
 ) -> Float[np.ndarray, " n"]:
     """Return the strains of the table at many times, such as amplitudes, shape (n,)."""
     table = np.asarray(protocol.table_times), np.asarray(protocol.table_strains)
-    return _in_table(np, np.asarray(times), *table)
+    return in_table(np, np.asarray(times), *table)
 
 
 def _in_numpy(protocol: FlowProtocol) -> list[np.ndarray]:

@@ -57,6 +57,14 @@ def test_growing_steps_are_as_accurate_as_short_ones(law):
     assert few < make_grid(FLOW, TIMES)[0].size / 3
 
 
+@pytest.mark.parametrize("how", [{"growth": 0.05}, {"relaxation_time": TIME}])
+def test_steps_grow_from_the_last_jump_of_a_rate_as_from_any(how):
+    # the same flow, once with an end of the table beyond the record
+    ends = step_rates([*RATES[0], 100.0], [*RATES[1], RATES[1][-1]])
+    (last, _), (held, _) = (make_grid(flow, TIMES, **how) for flow in (FLOW, ends))
+    np.testing.assert_array_equal(last, held)
+
+
 def test_what_a_law_adds_to_the_relaxation_does_not_make_steps_unstable():
     # h = 2σ: σ12 = Wi/3 (1 − e^(−3t/λ)); the rate turns the fluid by 0.4 in a relaxation time
     time, flow = 0.02, start_up(20.0)
